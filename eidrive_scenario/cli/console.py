@@ -17,13 +17,14 @@ from eidrive_scenario.evaluation import Verdict
 from eidrive_scenario.experiments.commands import reproduction_lines
 from eidrive_scenario.files.encodable import printable
 from eidrive_scenario.recording.text.run_log import describe_kind
+from eidrive_scenario.reporting.storyboard_diagram.layout import remark_of
 from eidrive_scenario.simulation import RunResult
 from eidrive_scenario.simulation.result import quantity_text
 from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.storyboard import Storyboard
-from eidrive_scenario.storyboard.tree.elements import ManeuverGroupElement, StoryElement
-from eidrive_scenario.storyboard.tree.events import ActionElement, EventElement
+from eidrive_scenario.storyboard.tree.elements import StoryElement
+from eidrive_scenario.storyboard.tree.events import ActionElement
 
 if TYPE_CHECKING:
     from eidrive_scenario.experiments.judgement import Judgement
@@ -139,7 +140,7 @@ def storyboard_tree(storyboard: Storyboard) -> Tree:
 
 def _add(branch: Tree, element: StoryElement) -> None:
     name = "" if element.kind == "storyboard" else element.name
-    node = branch.add(_heading(describe_kind(element.kind), name, _remarks(element)))
+    node = branch.add(_heading(describe_kind(element.kind), name, remark_of(element)))
     for verb, leaf in (("starts", element.start_leaf), ("stops", element.stop_leaf)):
         if leaf is not None:
             node.add(Text.assemble((f"{verb} when ", "cyan"), leaf.trigger.describe() or "criteria end the run"))
@@ -148,15 +149,6 @@ def _add(branch: Tree, element: StoryElement) -> None:
             node.add(_action(behavior))
     for child in element.elements:
         _add(node, child)
-
-
-def _remarks(element: StoryElement) -> str:
-    remarks = []
-    if isinstance(element, EventElement):
-        remarks.append(element.priority)
-    if isinstance(element, EventElement | ManeuverGroupElement) and element.limit != 1:
-        remarks.append(f"up to {element.limit} times")
-    return ", ".join(remarks)
 
 
 def _heading(kind: str, name: str, remarks: str) -> Text:

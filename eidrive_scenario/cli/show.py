@@ -232,7 +232,7 @@ def view(
     if page is not None:
         from eidrive_scenario.reporting.replay.page import make_replay
 
-        damage = make_replay(opened, page, other=None if second is None else open_recording(second)).damage
+        damage = make_replay(opened, page, other=None if second is None else open_recording(second))
     print_warnings(f"{path}: {line}" for line in damage)
     partials = filter(is_partial, [path, *([second] if second else [])])
     print_warnings(f"{partial}: the run did not end, the recording is incomplete" for partial in partials)

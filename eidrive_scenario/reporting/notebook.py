@@ -107,8 +107,9 @@ def write_replay(recording: str | PathLike[str], out: str | PathLike[str]) -> Pa
 
     Raise InputError if no frame can be read.
     """
-    location = path_argument(recording, "recording")
-    return make_replay(open_recording(recording_in(location)), path_argument(out, "out")).page
+    location, page = path_argument(recording, "recording"), path_argument(out, "out")
+    make_replay(open_recording(recording_in(location)), page)
+    return page
 
 
 def _replay_frame(recording: Path, height: int) -> str:

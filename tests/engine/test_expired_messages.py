@@ -18,7 +18,7 @@ from eidrive_scenario.export.recorded_run import open_run
 from eidrive_scenario.export.tables import write_csv
 from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.recording.text.run_log import RunLog
-from eidrive_scenario.reporting.replay.page import make_replay
+from eidrive_scenario.reporting.notebook import write_replay
 from eidrive_scenario.reporting.run_report.report import write_run_report
 from eidrive_scenario.simulation import RunResult, RunSettings, run_file
 from eidrive_scenario.simulation.run_outcome import expired_messages
@@ -56,7 +56,7 @@ def test_expired_messages_are_in_result(late: RunResult) -> None:
 def test_expired_messages_are_in_recording_replay_tables_and_log(late: RunResult, tmp_path: Path) -> None:
     assert late.recording is not None
     recording = read_recording(late.recording)
-    page = make_replay(recording, tmp_path / "replay.html").page
+    page = write_replay(late.recording, tmp_path / "replay.html")
     data = json.loads(html.fromstring(page.read_text(encoding="utf-8")).findtext(".//script[@id='data']") or "")
     assert data["series"]["Ego"]["expired"]["RSU"][-1] == RECEIVED
     write_csv(open_run(late.recording), tmp_path / "messages.csv", "messages")

@@ -14,6 +14,7 @@ from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.export.foxglove.schemas import UPRIGHT, WORLD, Color, Foxglove, rgba, rotation, stamp, vector
 from eidrive_scenario.export.geometry import Line, edge_line, lane_edges, point_spacing
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.reporting.snapshot import LINK_LIFETIME
 from eidrive_scenario.roads import RoadNetwork
 
 _COLORS: Mapping[str, Color] = {
@@ -106,8 +107,6 @@ def _add_boxes(entity: Any, objects: Detections, color: Color) -> None:
         add_text(entity, f"{category} {confidence:.2f}", (x, y, z + 0.5 * height + 0.3), 0.5)
 
 
-LINK_LIFETIME = 0.15
-"""Time for which the line of a message is shown [s]. It exceeds the period of 10 Hz messages to avoid flicker."""
 _PAINT: Mapping[str, Color] = {"yellow": (0.95, 0.8, 0.2, 1.0)}
 _WHITE: Color = (0.95, 0.95, 0.95, 1.0)
 _EDGE: Color = (0.45, 0.45, 0.45, 1.0)

@@ -24,7 +24,7 @@ from matplotlib.ticker import FixedFormatter, FixedLocator, MaxNLocator, Percent
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.experiments.statistics.intervals import Proportion
-from eidrive_scenario.reporting.drawing.vector_canvas import LABEL, Size, paper_style
+from eidrive_scenario.reporting.drawing.vector_canvas import LABEL, NO_METADATA, Size, paper_style
 
 PAGE_COLORS = {"#475569": "--axis", "#e5e7eb": "--line", "#334155": "--text", "#ffffff": "--paper"}
 """CSS variables of the page, whose values depend on its light or dark scheme, by the color that matplotlib draws."""
@@ -55,8 +55,7 @@ def inline_svg(figure: Figure, title: str, *, kind: str = "chart", above: str = 
     above  SVG elements that are drawn last, in points from the upper left corner
     """
     buffer = io.StringIO()
-    without_metadata = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    figure.savefig(buffer, format="svg", transparent=True, metadata=without_metadata)
+    figure.savefig(buffer, format="svg", transparent=True, metadata=NO_METADATA[".svg"])
     svg = buffer.getvalue()
     svg = svg[svg.index("<defs>") : svg.rindex("</svg>")]
     svg = re.sub(r"<style.*?</style>", "", svg, flags=re.DOTALL)  # applies to all elements of a page

@@ -56,7 +56,7 @@ _PAD = 5.0
 """Distance of scale bar and axes from the edge [pt]."""
 _ARROW = 15.0
 """Length of the arrows of the axes [pt]."""
-_NO_METADATA: dict[str, dict[str, None]] = {
+NO_METADATA: dict[str, dict[str, None]] = {
     ".png": {"Software": None},
     ".svg": dict.fromkeys(("Creator", "Date", "Format", "Type")),
     ".pdf": dict.fromkeys(("Creator", "CreationDate", "Producer")),
@@ -307,12 +307,12 @@ def write_figure(figure: Figure, path: str | os.PathLike[str], resolution: float
     suffix = location.suffix.lower()
     buffer = io.BytesIO()
     with paper_style():
-        figure.savefig(buffer, format=suffix[1:], dpi=resolution, metadata=_NO_METADATA[suffix])
+        figure.savefig(buffer, format=suffix[1:], dpi=resolution, metadata=NO_METADATA[suffix])
     with write_atomically(location) as stream:
         stream.write(buffer.getvalue())
 
 
-def check_format(option: str, path: Path | None, suffixes: tuple[str, ...] = tuple(_NO_METADATA)) -> None:
+def check_format(option: str, path: Path | None, suffixes: tuple[str, ...] = tuple(NO_METADATA)) -> None:
     """Raise SettingError if a picture has another suffix than these."""
     if path is not None and path.suffix.lower() not in suffixes:
         hint = f"give a file name in {', '.join(suffixes)}"

@@ -175,22 +175,12 @@ def _roads(roads: RoadDrawing) -> dict[str, Any]:
     }
 
 
-@dataclass(frozen=True)
-class Replay:
-    """Written page, and one line for each kind of damage of its recording."""
-
-    page: Path
-    damage: tuple[str, ...]
-
-
 def make_replay(
-    recording: Recording,
-    out: Path,
-    *,
-    other: Recording | None = None,
-    library: str = "",
-) -> Replay:
+    recording: Recording, out: Path, *, other: Recording | None = None, library: str = ""
+) -> tuple[str, ...]:
     """Write the replay of a recording to the file `out`, with the verdicts of the result in its folder.
+
+    Return one line for each kind of damage.
 
     other    recording that the page shows over this one, with the verdicts of the result in its folder
     library  address of a file with three.js, see `write_replays`; "" if the page contains it
@@ -220,7 +210,8 @@ def make_replay(
         other=second,
         library=library,
     )
-    return Replay(write_page(out, TEMPLATE, **values), damage)
+    write_page(out, TEMPLATE, **values)
+    return damage
 
 
 def _read_run(recording: Recording, report: DamageReport) -> RunOfPage:

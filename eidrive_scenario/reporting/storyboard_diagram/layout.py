@@ -207,18 +207,23 @@ def _box(element: StoryElement, elements: ReferenceMatch[StoryElement]) -> Box:
         behaviors = [behavior for actor in element.actors for behavior in element.behaviours(actor)]
         texts = dict.fromkeys(behavior.describe() for behavior in behaviors)
         lines += [BoxLine(Role.CONTENT, "", text) for text in texts]
-    remarks = [element.priority] if isinstance(element, EventElement) else []
-    if isinstance(element, EventElement | ManeuverGroupElement) and element.limit != 1:
-        remarks.append(f"up to {element.limit} times")
     return Box(
         element.kind,
         element.name,
         element.record.path,
-        ", ".join(remarks),
+        remark_of(element),
         tuple(lines),
         [_box(child, elements) for child in children],
         tuple(dict.fromkeys(waits)),
     )
+
+
+def remark_of(element: StoryElement) -> str:
+    """Return the priority and the maximum number of executions of an element, as far as it has them."""
+    remarks = [element.priority] if isinstance(element, EventElement) else []
+    if isinstance(element, EventElement | ManeuverGroupElement) and element.limit != 1:
+        remarks.append(f"up to {element.limit} times")
+    return ", ".join(remarks)
 
 
 def _trigger(trigger: Trigger, role: Role, lead: str) -> Iterator[BoxLine]:

@@ -22,9 +22,9 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.reporting.live import live_view
 from eidrive_scenario.reporting.live.live_view import Pace
+from eidrive_scenario.reporting.notebook import write_replay
 from eidrive_scenario.reporting.replay.frame_data import replay_data
 from eidrive_scenario.reporting.replay.models import ActorModels
-from eidrive_scenario.reporting.replay.page import make_replay
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 from eidrive_scenario.simulation.recorded_outcome import recorded_bodies
 
@@ -153,8 +153,7 @@ def test_live_page_at_the_end_equals_the_replay(tmp_path: Path) -> None:
         run_and_save(ONE, settings=SHORT, out=tmp_path, observers=[live])
         shown: Any = html.fromstring(live.page())
         (*_, (_, end)) = live.events()
-    recording = read_recording(tmp_path)
-    file = make_replay(recording, tmp_path / "page.html").page
+    file = write_replay(tmp_path, tmp_path / "page.html")
     written: Any = html.fromstring(file.read_text(encoding="utf-8"))
     for path in ("//title", "//h1/span[@id='badge']", "//div[@id='verdict']", "//div[@class='panel']"):
         texts = [[found.text_content() for found in page.xpath(path)] for page in (shown, written)]

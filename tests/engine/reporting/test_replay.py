@@ -18,6 +18,7 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.recording.recorder import Recorder
 from eidrive_scenario.recording.recording import Recording, read_recording
+from eidrive_scenario.reporting.notebook import write_replay
 from eidrive_scenario.reporting.replay.frame_data import replay_data
 from eidrive_scenario.reporting.replay.page import make_replay
 from eidrive_scenario.reporting.run_report.settings_text import short_number
@@ -92,7 +93,7 @@ def test_replay_data_lists_storyboard_transitions(street: Play) -> None:
 
 
 def test_replay_page_contains_run_without_external_resources(street: Play, tmp_path: Path) -> None:
-    out = make_replay(read_recording(recorded(street(1), tmp_path)), tmp_path / "pages" / "run.html").page
+    out = write_replay(recorded(street(1), tmp_path), tmp_path / "pages" / "run.html")
     text = out.read_text(encoding="utf-8")
     assert not re.search(r"(?:src|href)\s*=\s*[\"']?(?!#|data:)", text)
     assert "http" not in text.replace("http://www.w3.org/2000/svg", "")
@@ -105,7 +106,7 @@ def test_replay_page_contains_run_without_external_resources(street: Play, tmp_p
 
 def test_replay_of_empty_recording_raises_input_error(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="contains no readable frame"):
-        make_replay(read_recording(recorded([], tmp_path)), tmp_path / "run.html")
+        write_replay(recorded([], tmp_path), tmp_path / "run.html")
 
 
 @pytest.mark.parametrize(
@@ -130,7 +131,7 @@ def test_replay_page_without_stations_hides_station_panels(street: Play, tmp_pat
     hidden = ".stations { display: none; }"
     alone = [Frame(frame.view) for frame in street(1)]
     for frames, expected in ((street(1), False), (alone, True)):
-        page = make_replay(read_recording(recorded(frames, tmp_path)), tmp_path / "page.html").page
+        page = write_replay(recorded(frames, tmp_path), tmp_path / "page.html")
         assert (hidden in page.read_text(encoding="utf-8")) is expected
 
 
@@ -159,7 +160,7 @@ def test_replay_report_timeout_of_station_ends_received_boxes(
     for frame in street(1, frozenset(range(30, 100))):
         recorder.observe(frame)
     recorder.close()
-    page = make_replay(read_recording(tmp_path / "run.mcap"), tmp_path / "replay.html").page.read_text(encoding="utf-8")
+    page = write_replay(tmp_path / "run.mcap", tmp_path / "replay.html").read_text(encoding="utf-8")
     data = json.loads(html.fromstring(page).findtext(".//script[@id='data']") or "")
     column = unpacked(data["stations"]["Ego"]["received"])
     received = [tick for tick, senders in enumerate(column) if senders]
@@ -191,7 +192,8 @@ def recorded_roads(folder: Path, name: str, frames: list[Frame], length: float) 
 def test_replay_of_two_runs_contains_both_with_their_durations(street: Play, tmp_path: Path) -> None:
     first = recorded_roads(tmp_path, "first", street(1), 100.0)
     second = recorded_roads(tmp_path, "second", street(4)[:60:2], 100.0)
-    page = make_replay(first, tmp_path / "two.html", other=second).page.read_text(encoding="utf-8")
+    make_replay(first, tmp_path / "two.html", other=second)
+    page = (tmp_path / "two.html").read_text(encoding="utf-8")
     root = html.fromstring(page)
     data = json.loads(root.findtext(".//script[@id='data']") or "")
     assert (len(data["times"]), len(data["other"]["times"])) == (100, 30)
@@ -213,6 +215,6 @@ def test_damage_of_second_recording_names_its_file(street: Play, tmp_path: Path)
     first = recorded_roads(tmp_path, "first", street(1)[:40], 100.0)
     file = recorded_roads(tmp_path, "second", street(1)[:40], 100.0).path
     file.write_bytes(file.read_bytes()[:-40])
-    made = make_replay(first, tmp_path / "two.html", other=read_recording(file))
-    assert made.damage
-    assert all(line.startswith(f"{file}: ") for line in made.damage)
+    damage = make_replay(first, tmp_path / "two.html", other=read_recording(file))
+    assert damage
+    assert all(line.startswith(f"{file}: ") for line in damage)

@@ -14,9 +14,9 @@ from report_table import listed_runs
 from eidrive_scenario.experiments.reported_run import ReportedRun, parse_run
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recorder import Recorder
-from eidrive_scenario.recording.recording import open_recording
 from eidrive_scenario.recording.run_files import RECORDING
-from eidrive_scenario.reporting.replay.page import make_replay, write_replays
+from eidrive_scenario.reporting.notebook import write_replay
+from eidrive_scenario.reporting.replay.page import write_replays
 from eidrive_scenario.reporting.run_report.rates import parameter_matrix, scenario_matrix
 from eidrive_scenario.reporting.run_report.report import write_run_report
 from eidrive_scenario.reporting.run_report.reported_runs import read_runs
@@ -113,7 +113,7 @@ def test_replays_of_a_report_share_one_file_of_three_js(street: Play, tmp_path: 
     linked, _ = write_replays(read_runs(files)[0], tmp_path / "out")
     folder = tmp_path / "out" / "replays"
     assert sorted(path.name for path in folder.iterdir()) == ["a.html", "b.html", "three.js"]
-    alone = make_replay(open_recording(files[0].with_name(RECORDING)), tmp_path / "alone.html").page
+    alone = write_replay(files[0].with_name(RECORDING), tmp_path / "alone.html")
     shared = (folder / "three.js").read_text(encoding="utf-8")
     assert shared in alone.read_text(encoding="utf-8")
     for entry in linked:
