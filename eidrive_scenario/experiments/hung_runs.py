@@ -21,7 +21,7 @@ _DUMP = "Timeout"
 
 
 def last_resort(
-    report: Callable[[WallLimitError], None],
+    report: Callable[[WallLimitError], object],
     dump: IO[Any] | None = None,
     publish: Callable[[Limit], None] | None = None,
     *,
@@ -69,7 +69,7 @@ class HungRunError(SimulationError):
 def report_hung_runs(report: Path) -> None:
     """End this process at a wall limit if the code of the run does not return, and write a report to this file."""
     file = report.open("wb", buffering=0)  # open as long as the process, as faulthandler needs its descriptor
-    set_last_resort(last_resort(lambda error: _write(file, str(error)), file))
+    set_last_resort(last_resort(lambda error: file.write(f"{error}\n".encode()), file))
 
 
 def hang_of(report: Path) -> HungRunError | None:
@@ -79,7 +79,3 @@ def hang_of(report: Path) -> HungRunError | None:
     except FileNotFoundError:
         return None
     return HungRunError(text) if text else None
-
-
-def _write(file: IO[Any], text: str) -> None:
-    file.write(f"{text}\n".encode())

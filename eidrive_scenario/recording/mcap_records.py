@@ -118,7 +118,6 @@ class McapFile:
     def records(self) -> Iterator[Record]:
         """Yield all records outside of chunks in file order, and check the checksums of the file."""
         sums = _FileSums(self._damage)
-        sums.add(MAGIC)
         offset = len(MAGIC)
         for _ in range(MAX_RECORDS):
             head = self.read(offset, _HEAD.size)
@@ -256,14 +255,11 @@ class _FileSums:
 
     def __init__(self, damage: DamageReport) -> None:
         self._damage = damage
-        self._sum = 0
+        self._sum = zlib.crc32(MAGIC)
         self._ended = False
         self._summary = 0
         self.broken = False
         """Whether bytes were skipped, so that the checksums cannot match."""
-
-    def add(self, data: bytes) -> None:
-        self._sum = zlib.crc32(data, self._sum)
 
     def add_record(self, opcode: int, head: bytes, body: bytes) -> None:
         if opcode == DATA_END:
@@ -277,8 +273,7 @@ class _FileSums:
         elif self._ended:
             self._summary = zlib.crc32(body, zlib.crc32(head, self._summary))
         else:
-            self.add(head)
-            self.add(body)
+            self._sum = zlib.crc32(body, zlib.crc32(head, self._sum))
 
     def _check_checksum(self, damage: str, computed: int, stored: bytes) -> None:
         if self.broken or stored != struct.pack("<I", computed):

@@ -33,8 +33,6 @@ INTERVALS: Mapping[str, Callable[..., Proportion]] = {
 number of runs that was fixed before."""
 Identity: TypeAlias = tuple[str, int | None, int, tuple[tuple[str, Any], ...]]
 """Scenario, run of a distribution, seed, and values of the axes of a run."""
-FIXED = ("key", "number", "status", "error", "command", "seconds")
-"""Columns of every run before those of its axes and of its result."""
 
 
 @dataclass(frozen=True)
@@ -265,16 +263,27 @@ def _settings_of(run: StoredRun) -> _Settings:
         return _Settings()
 
 
-def columns_of(run: StoredRun) -> dict[str, Any]:
-    """Return the flat row of a run: status, axes (`vary.NAME`), then the columns of `RunResult.to_dict`."""
-    fixed = dict(zip(FIXED, (run.key, run.number, run.status, run.error, run.command, run.wall_s), strict=True))
-    identity = {"scenario": run.scenario, "run": run.run, "seed": run.seed}
-    return {**fixed, **{f"vary.{name}": value for name, value in run.point.items()}, **identity, **run.result}
-
-
 def as_table(runs: Iterable[StoredRun]) -> tuple[list[str], list[dict[str, Any]]]:
-    """Return the names of all columns in order of appearance, and the rows."""
-    rows = [columns_of(run) for run in runs]
+    """Return the names of all columns in order of appearance, and the rows.
+
+    A row has the status of a run, its axes (`vary.NAME`), then the columns of `RunResult.to_dict`.
+    """
+    rows = [
+        {
+            "key": run.key,
+            "number": run.number,
+            "status": run.status,
+            "error": run.error,
+            "command": run.command,
+            "seconds": run.wall_s,
+            **{f"vary.{name}": value for name, value in run.point.items()},
+            "scenario": run.scenario,
+            "run": run.run,
+            "seed": run.seed,
+            **run.result,
+        }
+        for run in runs
+    ]
     return list(dict.fromkeys(name for row in rows for name in row)), rows
 
 

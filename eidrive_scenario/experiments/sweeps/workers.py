@@ -47,14 +47,6 @@ _is_worker = False
 """Whether this process only executes runs, so that no user interrupts it."""
 
 
-def prepare_process() -> None:
-    """Prepare a worker process: equal images are processed once, and an interruption ends the command, not the run."""
-    global _is_worker
-    image_memory.activate(image_memory.ImageMemory())
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _is_worker = True
-
-
 @dataclass(frozen=True)
 class KeptFiles:
     """Files of the runs of a sweep.
@@ -202,7 +194,7 @@ class _Worker:
 
     def __init__(self, folder: Path, number: int) -> None:
         self._report = folder / str(number)
-        self._pool = ProcessPoolExecutor(
+        self.pool = ProcessPoolExecutor(
             1, mp_context=worker_context(), initializer=_initialize, initargs=(self._report,)
         )
         self.has_ended = False
@@ -210,7 +202,7 @@ class _Worker:
     def submit(self, function: Callable[..., R], /, *arguments: Any) -> Future[R]:
         """Start a call. Raise BrokenProcessPool if the process ended while it was idle."""
         outer: Future[R] = Future()
-        inner = self._pool.submit(function, *arguments)
+        inner = self.pool.submit(function, *arguments)
         outer.set_running_or_notify_cancel()
         inner.add_done_callback(lambda done: self._pass_on(done, outer))
         return outer
@@ -222,14 +214,6 @@ class _Worker:
             outer.set_result(inner.result())
         else:
             outer.set_exception((hang_of(self._report) if self.has_ended else None) or error)
-
-    def terminate(self) -> None:
-        """End the process and its call, without waiting for it."""
-        terminate(self._pool)
-
-    def shut_down(self, *, wait: bool) -> None:
-        """Release the process once it has ended."""
-        self._pool.shutdown(wait=wait, cancel_futures=True)
 
 
 class LocalWorkers:
@@ -245,22 +229,23 @@ class LocalWorkers:
     def _start(self) -> _Worker:
         return _Worker(self._folder, next(self._numbers))
 
+    def _replaced(self, worker: _Worker) -> _Worker:
+        """Return a new worker in place of one that has ended."""
+        worker.pool.shutdown(wait=False, cancel_futures=True)
+        return self._start()
+
     def submit(self, function: Callable[..., R], /, *arguments: Any) -> Future[R]:
         """Start a call in an idle worker. Raise RuntimeError if there is none."""
         for future in [future for future in self._busy if future.done()]:
             worker = self._busy.pop(future)
-            if worker.has_ended:
-                worker.shut_down(wait=False)
-                worker = self._start()
-            self._idle.append(worker)
+            self._idle.append(self._replaced(worker) if worker.has_ended else worker)
         if not self._idle:
             raise RuntimeError("all workers are busy")
         worker = self._idle.pop(0)
         try:
             future = worker.submit(function, *arguments)
         except BrokenProcessPool:  # the process was killed while it was idle
-            worker.shut_down(wait=False)
-            worker = self._start()
+            worker = self._replaced(worker)
             future = worker.submit(function, *arguments)
         self._busy[future] = worker
         return future
@@ -271,14 +256,18 @@ class LocalWorkers:
     def close(self) -> None:
         workers = (*self._idle, *self._busy.values())
         for worker in workers:
-            worker.terminate()
+            terminate(worker.pool)
         for worker in workers:
-            worker.shut_down(wait=True)
+            worker.pool.shutdown(wait=True, cancel_futures=True)
         self._idle, self._busy = [], {}
         shutil.rmtree(self._folder, ignore_errors=True)
 
 
 def _initialize(report: Path) -> None:
-    prepare_process()
+    """Prepare a worker process: equal images are processed once, and an interruption ends the command, not the run."""
+    global _is_worker
+    image_memory.activate(image_memory.ImageMemory())
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _is_worker = True
     report_hung_runs(report)
     end_with_parent()
