@@ -85,7 +85,7 @@ def dataset(
         out,
         settings,
         axes=parse_axes(vary or []),
-        seeds=[1] if seeds is None else parse_seeds("--seeds", seeds),
+        seeds=[1] if seeds is None else parse_seeds(seeds),
         sensors=None if sensors is None else read_sensors(sensors),
     )
     bar = console(stderr=True)

@@ -129,16 +129,16 @@ _SHARD = re.compile(r"(\d{1,9})/(\d{1,9})")
 """Patterns of limited length: Python does not convert texts of thousands of digits to integers."""
 
 
-def parse_seeds(option: str, text: str) -> list[int]:
-    """Return the seeds of a text such as `1-10`, `3` or `1,2,5-8`. Raise SettingError for another text."""
+def parse_seeds(text: str) -> list[int]:
+    """Return the seeds of `--seeds`, a text such as `1-10`, `3` or `1,2,5-8`. Raise SettingError for another text."""
     seeds: list[int] = []
     for part in text.split(","):
         match = _SEEDS.fullmatch(part.strip())
         first, last = (int(match[1]), int(match[2] or match[1])) if match is not None else (1, 0)
         if last < first:
-            raise SettingError(Diagnostic(f"{option}: no seeds (got {quoted(text)}; expected 1-10 or 1,2,5)"))
+            raise SettingError(Diagnostic(f"--seeds: no seeds (got {quoted(text)}; expected 1-10 or 1,2,5)"))
         if len(seeds) + last - first >= MOST_SEEDS:
-            raise SettingError(Diagnostic(f"{option}: more than {MOST_SEEDS} seeds (got {quoted(text)})"))
+            raise SettingError(Diagnostic(f"--seeds: more than {MOST_SEEDS} seeds (got {quoted(text)})"))
         seeds += range(first, last + 1)
     return seeds
 

@@ -125,7 +125,7 @@ def sweep(
     check_record(record, out)
     path = resolve_scenario(scenario)
     check_output_paths({"--store": store, "--out": out}, [path, *settings.sources])
-    chosen = None if seeds is None else parse_seeds("--seeds", seeds)
+    chosen = None if seeds is None else parse_seeds(seeds)
     kind = definition(path)
 
     def typed(axes: Sequence[Axis]) -> tuple[Axis, ...]:

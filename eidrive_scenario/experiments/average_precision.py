@@ -30,18 +30,13 @@ class Matches:
     taken: Integers = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
 
-def match(boxes: Array, scores: Array, objects: Array, ignored: Bools, least: float = LEAST_OVERLAP) -> Matches:
+def match(boxes: Array, scores: Array, objects: Array, ignored: Bools) -> Matches:
     """Match detections (N, 4) with objects (M, 4) of one class; `ignored` (M,) objects are not required and not errors.
 
     As `match_by_share`; in addition, a detection that lies by half in an ignored object does not count.
     """
-    return match_by_share(
-        overlap(boxes, objects),
-        scores,
-        ignored,
-        least,
-        covered(boxes, objects[ignored]).max(axis=1, initial=0.0) >= 0.5,
-    )
+    harmless = covered(boxes, objects[ignored]).max(axis=1, initial=0.0) >= 0.5
+    return match_by_share(overlap(boxes, objects), scores, ignored, LEAST_OVERLAP, harmless)
 
 
 def match_by_share(

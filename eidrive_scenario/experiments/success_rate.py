@@ -43,8 +43,8 @@ def decision_text(test: RatioTest, decision: Decision, rate: Proportion) -> str:
     return f"success rate of at least {test.bad:.1%} with a confidence of {confidence:.0%}: {decision} ({runs})"
 
 
-def decide_rate(run: Callable[[int], RunResult], test: RatioTest, *, first_seed: int = 1) -> RateVerdict:
-    """Return the verdict on the success rate of a run, which is called with one seed after the other.
+def decide_rate(run: Callable[[int], RunResult], test: RatioTest) -> RateVerdict:
+    """Return the verdict on the success rate of a run, which is called with the seeds 1, 2, 3 …
 
     An exception of a run ends the test. Raise SimulationError for a run without a verdict: it ended at its time limit
     before a criterion failed, or no criterion judges it.
@@ -53,7 +53,7 @@ def decide_rate(run: Callable[[int], RunResult], test: RatioTest, *, first_seed:
     trials = 0
     decision = None
     while decision is None:
-        result = run(first_seed + trials)
+        result = run(1 + trials)
         if result.exit_code in (ABORTED, NOT_JUDGED):
             raise _without_verdict(result)
         trials += 1

@@ -33,6 +33,8 @@ NARROWEST, WIDEST = 0.002, 0.5
 """Minimum and maximum width s, as a share of the range."""
 LAPSES = (0.0, 0.02, 0.1)
 """Tested shares of outcomes that do not depend on the value."""
+CONFIDENCE = 0.95
+"""Confidence of the interval of the boundary."""
 TRIED = 61
 """Number of values among which the next run is chosen."""
 
@@ -121,17 +123,17 @@ class BoundarySearch:
 
     def _shrink(self) -> None:
         """Shrink the tested range if the boundaries in the interval are too few to resolve it."""
-        low, middle, high = self._quantiles(0.95)
+        low, middle, high = self._quantiles()
         step = self._boundaries[1] - self._boundaries[0]
         if high - low < FEWEST * step and self.low <= middle <= self.high:
             reach = SHRUNK * (high - low) / 2.0
             self._set_range(max(middle - reach, self.low), min(middle + reach, self.high))
 
-    def _quantiles(self, confidence: float) -> tuple[float, float, float]:
+    def _quantiles(self) -> tuple[float, float, float]:
         """Return the lower limit of the central credible interval of the boundary, its median and its upper limit."""
         marginal = _normalized(self._log).reshape(BOUNDARIES, -1).sum(axis=1)
         ends = self._boundaries + (self._boundaries[1] - self._boundaries[0]) / 2.0
-        shares = (1.0 - confidence) / 2.0, 0.5, (1.0 + confidence) / 2.0
+        shares = (1.0 - CONFIDENCE) / 2.0, 0.5, (1.0 + CONFIDENCE) / 2.0
         low, middle, high = np.interp(shares, np.cumsum(marginal), ends).tolist()
         return low, middle, high
 
@@ -146,11 +148,11 @@ class BoundarySearch:
         best = int(np.argmin(entropy))
         return float(self._tried[best]), bool(rate[best] >= 0.5)
 
-    def estimate(self, confidence: float = 0.95) -> Boundary:
+    def estimate(self) -> Boundary:
         """Return the estimate with its central credible interval."""
         posterior = _normalized(self._log)
         marginal = posterior.reshape(BOUNDARIES, -1).sum(axis=1)
-        low, middle, high = self._quantiles(confidence)
+        low, middle, high = self._quantiles()
         is_inside = (self._boundaries >= self.low) & (self._boundaries <= self.high)
         inside = float(marginal[is_inside].sum())
         rising = float(posterior[:, :, 1].sum())
@@ -222,6 +224,10 @@ def find_boundary(
     return search.estimate()
 
 
+SHOWN_FAILURES = 10
+"""Maximum number of failures that a search returns."""
+
+
 @dataclass(frozen=True)
 class Falsification:
     """Result of a search for failures.
@@ -244,8 +250,6 @@ def falsify(
     *,
     runs: int,
     objective: str | None = None,
-    shown_failures: int = 10,
-    seed: int = 1,
     shown: Callable[[int, int], None] = lambda done, failed: None,
 ) -> Falsification:
     """Search a space for failed runs with Optuna's TPE sampler, and return the most different ones.
@@ -263,7 +267,7 @@ def falsify(
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)  # of the options of the sampler
-        sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, constant_liar=True)
+        sampler = optuna.samplers.TPESampler(seed=1, multivariate=True, constant_liar=True)
     study = optuna.create_study(sampler=sampler)
     executed: list[StoredRun] = []
     different: dict[str, StoredRun] = {}
@@ -292,7 +296,7 @@ def falsify(
         shown(len(different), len(failed))
     valued = [(value, run) for run in executed if (value := _objective(run, objective)) is not None]
     least = min(valued, key=lambda pair: pair[0])[1] if valued else None
-    return Falsification(len(different), len(failed), tuple(most_different(failed, axes, shown_failures)), least)
+    return Falsification(len(different), len(failed), tuple(most_different(failed, axes, SHOWN_FAILURES)), least)
 
 
 def most_different(runs: Sequence[StoredRun], axes: Sequence[Axis], count: int) -> list[StoredRun]:

@@ -61,12 +61,12 @@ def test_decide_rate_runs_consecutive_seeds_until_decision() -> None:
 
     def run(seed: int) -> Any:
         seeds.append(seed)
-        return result_of(seed, {12})
+        return result_of(seed, {2})
 
-    verdict = decide_rate(run, success_rate(0.5, expected=0.9), first_seed=11)
+    verdict = decide_rate(run, success_rate(0.5, expected=0.9))
     assert verdict.decision is Decision.PASSED
-    assert [failure.seed for failure in verdict.failures] == [12]
-    assert seeds == list(range(11, 11 + verdict.rate.trials))
+    assert [failure.seed for failure in verdict.failures] == [2]
+    assert seeds == list(range(1, 1 + verdict.rate.trials))
     # (t - 1) ln(0.5 / 0.9) + ln(0.5 / 0.1) <= -ln 19
     assert verdict.rate.trials == 9
 
