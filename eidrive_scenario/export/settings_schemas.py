@@ -37,16 +37,17 @@ _EMPTY: Schema = {"type": "object", "maxProperties": 0}
 class _Models:
     """Schemas of the settings of extensions, with definitions whose names are unique.
 
+    schemas      by group and name of the extension; they may be references
     definitions  content of the references
     """
 
     def __init__(self, groups: Iterable[str], warn: Warn, *common: type[BaseModel]) -> None:
         types: dict[tuple[str, str], type[BaseModel] | None] = {}
-        self._schemas: dict[tuple[str, str], Schema] = {}
+        self.schemas: dict[str, dict[str, Schema]] = {}
         for group in groups:
             names = registry(group)
+            self.schemas[group] = dict.fromkeys(names, _FREE)
             for name in names:
-                self._schemas[group, name] = _FREE
                 try:
                     types[group, name] = getattr(names.load(name), "settings_type", None)
                 except RegistryError as error:
@@ -54,21 +55,13 @@ class _Models:
         models = dict.fromkeys([*common, *(model for model in types.values() if model is not None)])
         references, whole = models_json_schema([(model, "validation") for model in models])
         self.definitions: Schema = whole.get(_DEFINITIONS, {})
-        for key, model in types.items():
-            self._schemas[key] = _EMPTY if model is None else dict(references[model, "validation"])
+        for (group, name), model in types.items():
+            self.schemas[group][name] = _EMPTY if model is None else dict(references[model, "validation"])
         self.common = [self._content(dict(references[model, "validation"])) for model in common]
-
-    def names(self, group: str) -> list[str]:
-        """Return the names of the extensions of a group."""
-        return [name for kind, name in self._schemas if kind == group]
-
-    def reference(self, group: str, name: str) -> Schema:
-        """Return the schema of the settings of an extension, which may be a reference."""
-        return self._schemas[group, name]
 
     def definition(self, group: str, name: str) -> Schema:
         """Return the schema of the settings of an extension, which is no reference."""
-        return self._content(self._schemas[group, name])
+        return self._content(self.schemas[group][name])
 
     def _content(self, schema: Schema) -> Schema:
         return self.definitions[schema["$ref"].rpartition("/")[2]] if "$ref" in schema else schema
@@ -100,7 +93,7 @@ def _stack(warn: Warn) -> Schema:
     conditions: list[Schema] = []
     for part, group in SELECTED.items():
         given = properties[part].get("default")
-        settings = {name: models.reference(group, name) for name in models.names(group)}
+        settings = models.schemas[group]
         names = [*settings]
         if part == "planner":  # properties of the stack may be the settings that it requires
             own = {name: models.definition(group, name) for name in names}
@@ -110,12 +103,12 @@ def _stack(warn: Warn) -> Schema:
         properties[f"{part}_settings"] = _FREE
         schemas = {name: {"properties": {f"{part}_settings": schema}} for name, schema in settings.items()}
         conditions += _cases(part, DEFAULT_PLANNER if given is None else given, schemas)
-    for name in models.names("planners"):
+    for name in models.schemas["planners"]:
         for key, setting in models.definition("planners", name).get("properties", {}).items():
             alternatives = properties.setdefault(key, {"anyOf": []}).get("anyOf", [])
             if key not in AgentSettings.model_fields and setting not in alternatives:
                 alternatives.append(setting)
-    trackers = models.names("trackers")
+    trackers = list(models.schemas["trackers"])
     properties["tracker"] = {
         "anyOf": [
             {"enum": [*dict.fromkeys([*trackers, NO_TRACKER])], "type": "string"},
@@ -124,7 +117,7 @@ def _stack(warn: Warn) -> Schema:
             _with_kind(models.definition("trackers", trackers[0]), NO_TRACKER, required=False),
         ]
     }
-    sensors = {name: models.definition("sensors", name) for name in models.names("sensors")}
+    sensors = {name: models.definition("sensors", name) for name in models.schemas["sensors"]}
     properties["sensors"] = {
         "anyOf": [
             {"type": "string"},
@@ -149,7 +142,7 @@ def _channel(warn: Warn) -> Schema:
     """Return the schema of a channel profile."""
     models = _Models(["channels"], warn, ChannelProfile)
     default = ChannelProfile.model_fields["model"].default
-    schemas = {name: models.reference("channels", name) for name in models.names("channels")}
+    schemas = models.schemas["channels"]
     return {
         "type": "object",
         "properties": {**models.common[0]["properties"], "model": {"enum": list(schemas), "type": "string"}},
@@ -162,8 +155,7 @@ def _criteria(warn: Warn) -> Schema:
     """Return the schema of criteria: a mapping of their names to their settings, or a list of such mappings."""
     models = _Models(["criteria"], warn)
     properties: Schema = {}
-    for name in models.names("criteria"):
-        settings = models.reference("criteria", name)
+    for name, settings in models.schemas["criteria"].items():
         is_complete = not models.definition("criteria", name).get("required")
         properties[name] = {"anyOf": [settings, {"type": "null"}]} if is_complete else settings
     mapping = {"type": "object", "properties": properties, "additionalProperties": False, "minProperties": 1}

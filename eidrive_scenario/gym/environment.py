@@ -23,6 +23,7 @@ from eidrive_scenario.gym.station_interface import RewardSettings, StationInterf
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, load_scenario
 from eidrive_scenario.run_options import Switch, checked_settings
 from eidrive_scenario.simulation import DEFAULT_SEED, RunSettings, Simulation
+from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 
 if TYPE_CHECKING:
     from eidrive_scenario.gym.rendering import Renderer
@@ -278,7 +279,7 @@ class ScenarioEnvironment:
                     "criteria": {verdict.name: verdict.passed for verdict in result.criteria},
                 }
             info["reward_terms"] = summed = sum_terms(reward_terms)
-            truncated = episode.is_truncated and not has_left
+            truncated = result is not None and result.end_reason == TIME_LIMIT and not has_left
             terminated = not truncated and (result is not None or has_left)
             observations[name] = interface.encoder.zeros() if has_left else interface.observe(episode)
             rewards[name], ends[name], limits[name], infos[name] = sum(summed.values()), terminated, truncated, info

@@ -13,7 +13,6 @@ from eidrive_scenario.driving.step import AgentStep, StationAction, StationPerce
 from eidrive_scenario.openscenario import ConcreteRun, Scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunResult, RunSettings, Simulation
-from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 from eidrive_scenario.simulation.scenario_options import select_planner
 from eidrive_scenario.simulation.tick import TickStart
 from eidrive_scenario.world.view import WorldView
@@ -71,11 +70,6 @@ class Episode:
     def perceived(self) -> Mapping[str, StationPerception]:
         """Perceptions of the present stations, by name."""
         return self.start.perceived
-
-    @property
-    def is_truncated(self) -> bool:
-        """Whether the run has ended by its time limit."""
-        return self.result is not None and self.result.end_reason == TIME_LIMIT
 
     def limit_time(self, duration: float) -> None:
         """End the run after this duration from now on [s] at the latest."""

@@ -66,7 +66,7 @@ class StationInterface:
         self.encoder = ObservationEncoder(observation, senders)
         self.decoder = ActionDecoder(self.actions)
         self.rewards = Rewards(reward, name)
-        self._needs_route = drives and (self.encoder.needs_route or self.rewards.needs_route)
+        self._needs_route = drives and (self.encoder.needs_route or reward.progress != 0.0)
         self._planner: RoutePlanner | None = None
         self._route: tuple[float, PathPart | None] = -1.0, None
         self._control: Control | None = None
@@ -163,11 +163,6 @@ class Rewards:
     def __init__(self, settings: RewardSettings, station: str) -> None:
         self.settings = settings
         self._station = station
-
-    @property
-    def needs_route(self) -> bool:
-        """Whether a term depends on the route."""
-        return self.settings.progress != 0.0
 
     def check_criteria(self, names: Collection[str]) -> None:
         """Raise SettingError if the criteria of the run do not have a weighted name."""

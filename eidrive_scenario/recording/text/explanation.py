@@ -169,7 +169,6 @@ class _Subject:
         self._history = _history(leaf)
         self._changes: list[StateChange] = []
         self._now = 0.0
-        self._ends: list[tuple[float, str]] = []
 
     def observe(self, frame: Frame) -> None:
         """Record the changes of the element and of its enclosing act."""
