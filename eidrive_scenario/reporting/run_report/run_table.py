@@ -9,8 +9,10 @@ from typing import Any, TypeAlias
 
 from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.experiments.reported_run import OUTCOMES, ReportedRun
+from eidrive_scenario.experiments.sweeps.axes import is_setting
 from eidrive_scenario.reporting.run_report.run_groups import RunGroup
 from eidrive_scenario.reporting.run_report.settings_text import flatten
+from eidrive_scenario.simulation.result import typed
 
 _SHOWN_SETTINGS = 4
 """Maximum number of settings that differ, and of varied values, that have a column from the start."""
@@ -123,11 +125,11 @@ def _columns(groups: Sequence[RunGroup], runs: Sequence[ReportedRun], texts: Num
 
     Those of groups have a value per group. The page makes columns of other settings from the settings of the runs.
     """
-    names = list(dict.fromkeys(name for group in groups for name in group.differing))
+    varied = list(dict.fromkeys(name for group in groups for name in group.varied))
+    names = list(dict.fromkeys(name for group in groups for name in group.differing if name not in varied))
     differing = names if len(names) <= _SHOWN_SETTINGS else [name for name in names if "." not in name]
-    varied = list(dict.fromkeys(name for group in groups for name in group.varied if name not in differing))
     of_groups: dict[str, list[Any]] = {name: [group.differing.get(name) for group in groups] for name in differing}
-    of_runs: dict[str, list[Any]] = {name: [run.value_of(name) for run in runs] for name in varied}
+    of_runs: dict[str, list[Any]] = {name: [_value(run, name) for run in runs] for name in varied}
     short = [name for name, values in (of_groups | of_runs).items() if max(map(_length, values)) <= _SHOWN_LETTERS]
     shown = short[:_SHOWN_SETTINGS]
     by_group = [
@@ -141,6 +143,15 @@ def _columns(groups: Sequence[RunGroup], runs: Sequence[ReportedRun], texts: Num
         *(_column(name, values, texts, is_shown=name in shown) for name, values in of_runs.items()),
         _column("seed", [run.seed for run in runs], texts),
     ]
+
+
+def _value(run: ReportedRun, name: str) -> int | float | str | None:
+    """Return the value of an axis of some runs, of other runs that in their settings; None without it."""
+    value = run.value_of(name)
+    if value is None and is_setting(name):
+        text = flatten(run.settings).get(name.replace("channel.", "channel_profile.", 1), "null")
+        return None if text == "null" else typed(text)
+    return value
 
 
 def _length(value: object) -> int:

@@ -16,6 +16,7 @@ from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.recording.run_files import read_result
 from eidrive_scenario.reporting.run_report.report import write_run_report
 from eidrive_scenario.reporting.run_report.run_groups import group_runs
+from eidrive_scenario.reporting.run_report.run_table import run_table
 from eidrive_scenario.simulation import RunSettings
 
 PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
@@ -139,6 +140,18 @@ def test_settings_that_differ_at_one_point_separate_groups() -> None:
     other: dict[str, Any] = {"stations": {"Ego": {"target_speed": 7.0, "detector": "oracle", "range": 50.0}}}
     groups = group_runs([swept(8.0), swept(10.0), swept(8.0, **other)])
     assert {group.differing["stations.Ego.target_speed"] for group in groups} == {"7", "8", "10"}
+
+
+def test_runs_without_an_axis_have_the_value_of_their_settings() -> None:
+    """The time limit differs, too, so that the delay distinguishes groups as well as runs of one."""
+
+    def run_at(delay: float, limit: str, *, is_swept: bool) -> ReportedRun:
+        settings: dict[str, Any] = {"channel_profile": {"delay": {"seconds": delay}}, "time_limit": limit}
+        return swept(8.0, **settings).model_copy(update={"axes": {"channel.delay.seconds": delay} if is_swept else {}})
+
+    runs = [*(run_at(delay, "9", is_swept=True) for delay in (0.0, 0.2)), run_at(0.1, "5", is_swept=False)]
+    (column,) = (one for one in run_table(group_runs(runs))["columns"] if one["title"] == "channel.delay.seconds")
+    assert sorted(column["values"]) == [0.0, 0.1, 0.2]
 
 
 def test_runs_of_a_distribution_are_one_group_with_its_varied_parameters() -> None:
