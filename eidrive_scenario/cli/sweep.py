@@ -132,7 +132,7 @@ def sweep(
         return with_types(axes, path, is_distribution=kind == "distribution")
 
     axes = typed(parse_axes(vary or []))
-    boundary = None if find_boundary is None else typed([parse_axis(find_boundary)])[0]
+    boundary = None if find_boundary is None else typed([parse_axis(find_boundary, "--find-boundary")])[0]
     search = Search.of(axes, boundary, bound, tolerance, falsify, objective, runs, chosen)
     if search is not None:
         axes, runs, chosen = search.fixed, None, chosen or [1]

@@ -87,28 +87,37 @@ class Axis:
         return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
 
 
-def parse_axis(text: str) -> Axis:
+def parse_axis(text: str, option: str = "--vary") -> Axis:
     """Return the axis of a text: `NAME=A,B,C` (list), `NAME=LOW:HIGH:STEP` (range), or `NAME=LOW:HIGH` (interval).
 
     A range contains its upper end if a step reaches it. Steps are exact decimals: three steps of 0.1 are 0.3.
-    Raise SettingError for other texts, and for numbers with other signs of a range, such as `0..1`.
+    Raise SettingError, which names the option, for other texts, and for numbers with other signs of a range, such as
+    `0..1`.
     """
+    try:
+        return _parsed(text)
+    except ValueError as error:
+        raise SettingError(Diagnostic(f"{option}: {quoted(text)}", str(error))) from error
+
+
+def _parsed(text: str) -> Axis:
+    """Return the axis of a text. Raise ValueError with the expected form."""
     name, separator, given = text.partition("=")
     name, given = name.strip(), given.strip()
     if not separator or not name or not given:
-        raise _error(text, "expected NAME=VALUES, such as EgoSpeed=6:12:0.5 or detector=oracle,yolov5")
+        raise ValueError("expected NAME=VALUES, such as EgoSpeed=6:12:0.5 or detector=oracle,yolov5")
     parts = given.split(":")
     if len(parts) in (2, 3) and all(NUMBER.fullmatch(part.strip()) for part in parts):
         numbers = [Decimal(part.strip()) for part in parts]
-        return _interval(name, text, numbers) if len(parts) == 2 else Axis(name, _range(text, *numbers))
+        return _interval(name, *numbers) if len(parts) == 2 else Axis(name, _range(*numbers))
     texts = [part.strip() for part in given.split(",")]
     if "" in texts:
-        raise _error(text, "expected a value between commas")
+        raise ValueError("expected a value between commas")
     if any(map(_resembles_range, texts)):
-        raise _error(text, f"write a range as {name}=LOW:HIGH:STEP, an interval as {name}=LOW:HIGH")
+        raise ValueError(f"write a range as {name}=LOW:HIGH:STEP, an interval as {name}=LOW:HIGH")
     values = tuple(map(typed, texts))
     if len(set(values)) < len(values):
-        raise _error(text, "a value is given twice")
+        raise ValueError("a value is given twice")
     return Axis(name, values)
 
 
@@ -123,7 +132,7 @@ def check_different(axes: Sequence[Axis]) -> None:
     """Raise SettingError if two axes have one name."""
     for index, axis in enumerate(axes):
         if axis_identity(axis.name) in [axis_identity(other.name) for other in axes[:index]]:
-            raise _error(axis.name, "the axis is given twice")
+            raise SettingError(Diagnostic(f"--vary: {axis.name!r}", "the axis is given twice"))
 
 
 def without_run(point: Point) -> Point:
@@ -148,22 +157,21 @@ def _resembles_range(text: str) -> bool:
     return len(limits) > 1 and any(limits) and all(not limit or NUMBER.fullmatch(limit) for limit in limits)
 
 
-def _interval(name: str, text: str, limits: list[Decimal]) -> Axis:
-    low, high = limits
+def _interval(name: str, low: Decimal, high: Decimal) -> Axis:
     if low >= high:
-        raise _error(text, "the upper limit is not above the lower one")
+        raise ValueError("the upper limit is not above the lower one")
     return Axis(name, low=float(low), high=float(high))
 
 
-def _range(text: str, low: Decimal, high: Decimal, step: Decimal) -> tuple[Scalar, ...]:
+def _range(low: Decimal, high: Decimal, step: Decimal) -> tuple[Scalar, ...]:
     if step == 0 or (high - low) / step < 0:
-        raise _error(text, "the step does not lead from the first to the last value")
+        raise ValueError("the step does not lead from the first to the last value")
     try:
         count = int((high - low) / step) + 1
     except (InvalidOperation, OverflowError):
-        raise _error(text, "the range is too large") from None
+        raise ValueError("the range is too large") from None
     if count > MOST_VALUES:
-        raise _error(text, f"the range has {count} values (at most {MOST_VALUES})")
+        raise ValueError(f"the range has {count} values (at most {MOST_VALUES})")
     values = [low + number * step for number in range(count)]
     whole = all(value == value.to_integral_value() for value in (low, step))
     return tuple(int(value) if whole else float(value) for value in values)
@@ -228,10 +236,6 @@ def changed_profile(profile: Mapping[str, Any], changes: Mapping[str, Scalar]) -
 def text_of_value(value: Scalar) -> str:
     """Return a value as the text of a parameter; integers and exact decimals as they were given."""
     return value if isinstance(value, str) else repr(value)
-
-
-def _error(text: str, hint: str) -> SettingError:
-    return SettingError(Diagnostic(f"--vary: {quoted(text)}", hint))
 
 
 _WHOLE = frozenset({ParameterType.INTEGER, ParameterType.INT, ParameterType.UNSIGNED_INT, ParameterType.UNSIGNED_SHORT})
