@@ -148,6 +148,17 @@ def road_object_bodies(roads: RoadNetwork, without: Collection[str] = ()) -> Ite
             yield RoadObjectBody(name, "post", foot._replace(h=head.pose.h, p=0.0, r=0.0), 0.0, 0.0, top, POST)
 
 
+def solid_boxes(roads: RoadNetwork, least_height: float) -> Array:
+    """Return boxes (N, 7) around the buildings and solid objects of a map that are higher than `least_height` [m]."""
+    boxes = [(*house.center, *house.size, house.yaw) for house in buildings(roads)]
+    for body in road_object_bodies(roads):
+        if body.solid and body.height > least_height:
+            length, width = (2.0 * body.radius,) * 2 if body.radius else (body.length, body.width)
+            x, y, z, yaw, *_ = body.pose
+            boxes.append((x, y, z + body.height / 2.0, length, width, body.height, yaw))
+    return np.array(boxes, dtype=float).reshape(-1, 7)
+
+
 def signal_heads(roads: RoadNetwork) -> list[SignalHead]:
     """Return the heads of standing and hanging signals in the order of the map, without painted ones."""
     # Low static signals at the height of the road are painted on it.

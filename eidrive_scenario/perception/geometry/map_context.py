@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array, Bools
-from eidrive_scenario.base.geometry import wrap_angle
+from eidrive_scenario.base.geometry import footprint, wrap_angle
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.world.road_objects import solid_boxes
 
 CELL = 0.5
 """Cell size of the mask of areas near roads [m]; larger for maps that would have more than MOST_CELLS."""
@@ -18,6 +20,11 @@ MOST_CELLS = 16_000_000
 BEYOND = 20.0
 """Margin of the mask around the center lines of the lanes [m]."""
 UNKNOWN, OFF, ON = -1, 0, 1
+ON_BODY = 0.3
+"""Maximum distance of points from the body of the map that they are on [m]: three times the noise of a lidar, and a
+usual error of the pose."""
+LOWEST = 0.25
+"""Height from which bodies of the map are considered [m]; lower ones are ground for a lidar."""
 LANE_DEVIATION = math.radians(25.0)
 """Standard deviation between the headings of vehicles and of their lanes [rad].
 
@@ -68,6 +75,33 @@ class MapContext:
         near[inside] = mask[cells[inside]] == ON
         return near
 
+    def is_of_traffic(self, plan: Array) -> Bools:
+        """Return whether points (N, 2) are near a road, and on no body of the map beside its lanes, as a wall is."""
+        of_traffic = self.near_road(plan)
+        rows, bodies = np.flatnonzero(of_traffic), self._bodies_beside_lanes
+        if not len(rows) or not len(bodies):
+            return of_traffic
+        points = plan[rows]
+        reach = np.hypot(bodies[:, 3], bodies[:, 4])[:, None] / 2.0 + ON_BODY
+        around = (bodies[:, :2] > points.min(axis=0) - reach) & (bodies[:, :2] < points.max(axis=0) + reach)
+        x, y, _, length, width, _, yaw = bodies[around.all(axis=1)].T[:, :, None]
+        cos, sin, dx, dy = np.cos(yaw), np.sin(yaw), points[:, 0] - x, points[:, 1] - y
+        on_body = (np.abs(cos * dx + sin * dy) <= length / 2.0 + ON_BODY) & (
+            np.abs(cos * dy - sin * dx) <= width / 2.0 + ON_BODY
+        )
+        of_traffic[rows] = ~on_body.any(axis=0)
+        return of_traffic
+
+    @cached_property
+    def _bodies_beside_lanes(self) -> Array:
+        """Boxes (N, 7) of the map that reach into the area near roads. On lanes they are obstacles."""
+        if self._roads is None:
+            return np.empty((0, 7))
+        boxes = solid_boxes(self._roads, LOWEST)
+        corners = footprint(boxes)
+        near = self.near_road(corners.reshape(-1, 2)).reshape(corners.shape[:2]).any(axis=1)
+        return boxes[near & ~self.on_lane(boxes[:, :2])]
+
     def lane_heading(self, plan: Array) -> Array:
         """Return the driving direction (N,) at points (N, 2) [rad]; NaN off the roads and in junctions."""
         headings = np.full(len(plan), np.nan)
@@ -96,12 +130,15 @@ class MapContext:
         against = np.cos(boxes[:, 6] - np.nan_to_num(lane)) < -math.cos(math.pi / 4)
         return np.where(np.isfinite(lane) & against, wrap_angle(boxes[:, 6] + math.pi), boxes[:, 6])
 
-    def ground(self, plan: Array, otherwise: float) -> Array:
-        """Return the height (N,) of the road below points (N, 2) [m]; `otherwise` off the roads and without a map."""
+    def ground(self, plan: Array, otherwise: float, near: Array | None = None) -> Array:
+        """Return the height (N,) of the road below points (N, 2) [m]; `otherwise` off the roads and without a map.
+
+        near  heights (N,) next to which the roads are, if several are above each other [m]
+        """
         height = np.full(len(plan), otherwise)
         if self._roads is None or self._level or not len(plan):
             return height
-        located = self._roads.locate(plan[:, 0], plan[:, 1])
+        located = self._roads.locate(plan[:, 0], plan[:, 1], near)
         for point in np.flatnonzero((located.road >= 0) & (located.outside <= 5.0)).tolist():
             road = located.roads[int(located.road[point])]
             height[point] = self._roads.road_pose_at(road, float(located.s[point]), float(located.t[point])).z

@@ -63,7 +63,7 @@ class LidarDetector(Detector):
         candidates: list[tuple[FittedObject, LevelFrame]] = []
         for name, cloud in self._lidars.revolutions(readings).items():
             pattern = self._lidars.pattern(name, readings.lidars[name])
-            scan = Scan(cloud, pattern, foot, self._map_context.near_road if restricted else None)
+            scan = Scan(cloud, pattern, foot, self._map_context.is_of_traffic if restricted else None)
             candidates += [
                 (candidate, scan.frame)
                 for candidate in objects(scan, self._map_context, self.settings.min_points)

@@ -34,6 +34,8 @@ TOUCHING = 0.2
 UNDERSIDE = 2.5
 """Height of the lowest point of an object that is above the road instead of on it [m]: the least usual headroom of
 bridges and signals is 4.5 m, and gaps between rings are up to 1 m within the range of a usual lidar."""
+SAMPLES = 8
+"""Number of points of an object whose heights above the road are compared."""
 NEAR = 1.5
 """Distance of boxes up to which their points may be those of one surface at grazing incidence [m]."""
 
@@ -60,29 +62,42 @@ def objects(scan: Scan, surroundings: MapContext, min_points: int) -> list[Fitte
         separate += good or _split_dense(scan, poor) or [poor]
     road_users: list[FittedObject] = []
     others: list[FittedObject] = []
-    for candidate in _merge_parts(scan, separate):
+    for candidate in _standing(scan, surroundings, _merge_parts(scan, separate)):
         is_road_user = candidate.fit.deviation <= UNLIKELY and candidate.fit.name != "pole"
         (road_users if is_road_user else others).append(candidate)
     return road_users + _obstacles(scan, surroundings, others)
 
 
-def _obstacles(scan: Scan, surroundings: MapContext, candidates: list[FittedObject]) -> list[FittedObject]:
-    """Return those of the objects that stand on lanes for vehicles, above the road of the map.
+def _standing(scan: Scan, surroundings: MapContext, candidates: list[FittedObject]) -> list[FittedObject]:
+    """Return those of the objects that stand on the road of the map.
 
     Below crests and in dips the height of the ground that a scan shows may be wrong, and a part of the road stand out.
     """
+    if not candidates or not surroundings.has_map:
+        return candidates
+    samples = np.array(
+        [candidate.rows[np.linspace(0, len(candidate.rows) - 1, SAMPLES).astype(int)] for candidate in candidates]
+    )
+    points = scan.points[samples.ravel()]
+    # Both heights are those of the map: an error of the own height does not count.
+    roads = surroundings.ground(
+        scan.frame.to_world(np.array([*points[:, :2], np.zeros(2)])), scan.foot, np.array([*points[:, 2], scan.foot])
+    )
+    heights = (points[:, 2] - scan.foot - roads[:-1] + roads[-1]).reshape(samples.shape)
+    standing = (heights.max(axis=1) > CLEARANCE) & (heights.min(axis=1) < UNDERSIDE)
+    return [candidate for candidate, stands in zip(candidates, standing.tolist(), strict=True) if stands]
+
+
+def _obstacles(scan: Scan, surroundings: MapContext, candidates: list[FittedObject]) -> list[FittedObject]:
+    """Return those of the objects that stand on lanes for vehicles."""
     if not candidates or not surroundings.has_map:
         return []
     centers = scan.frame.to_world(np.array([scan.points[candidate.rows, :2].mean(axis=0) for candidate in candidates]))
     on_lane = surroundings.on_lane(centers).tolist()
     headings = surroundings.lane_heading(centers) - scan.frame.yaw
-    # Both heights are those of the map: an error of the own height does not count.
-    roads = surroundings.ground(np.array([*centers, scan.frame.to_world(np.zeros(2))]), scan.foot)
-    rises = roads[:-1] - roads[-1]
     obstacles = []
-    for candidate, is_on_lane, heading, rise in zip(candidates, on_lane, headings.tolist(), rises, strict=True):
-        height = scan.points[candidate.rows, 2] - scan.foot - rise
-        if not is_on_lane or height.max() <= CLEARANCE or height.min() >= UNDERSIDE:
+    for candidate, is_on_lane, heading in zip(candidates, on_lane, headings.tolist(), strict=True):
+        if not is_on_lane:
             continue
         fit = scan.fit(candidate.rows, ("misc",), heading if math.isfinite(heading) else None)
         if fit is not None:

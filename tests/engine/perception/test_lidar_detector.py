@@ -264,6 +264,45 @@ def test_what_stands_on_a_lane_is_detected_though_no_road_user(
         assert detections.boxes[0, 3:5] == pytest.approx(size[:2], abs=0.3)
 
 
+def detect_on_roads(street: Any, roads: RoadNetwork, *things: Any) -> Detections:
+    """Return what the first of the objects detects; they stand on the road below them, in a world with the map."""
+    with World(roads, dt=0.05) as world:
+        for thing in things:
+            location = roads.locate_at(thing.x, thing.y)
+            assert location is not None
+            pose = roads.road_pose_at(location.road, location.s, location.t)
+            world.add(street.spec(thing), Placement(thing.x, thing.y, pose.z, thing.yaw, pose.p))
+        readings = Rig(street.spec(things[0]), {"roof": CLEAN}, seed=1).read(world, world.view())
+    detector = LidarDetector()
+    detector.setup(DetectorContext(street.spec(things[0]), {"roof": CLEAN}, roads))
+    return detector.detect(readings)
+
+
+@pytest.mark.parametrize("x", [-6.0, 0.0, 6.0])
+def test_road_that_rises_behind_a_dip_is_no_object(street: Any, x: float) -> None:
+    """A road rises by 10 %, from x = 0 on with a radius of 200 m. Only the car on it is an object."""
+    profile = """<elevationProfile><elevation s="0" a="0" b="0.1" c="0" d="0"/>
+    <elevation s="50" a="5" b="0.1" c="0.0025" d="0"/></elevationProfile>"""
+    roads = RoadNetwork.parse(map_xml(road_xml(x=-50.0, profiles=profile)))
+    ego, lead = street.thing("Ego", x, -1.75), street.thing("Lead", x + 12.0, -1.75)
+    assert len(detect_on_roads(street, roads, ego)) == 0
+    detections = detect_on_roads(street, roads, ego, lead)
+    assert detections.classes == ("car",)
+    assert math.dist(detections.boxes[0, :2], lead.box[:2]) < 0.5
+
+
+@pytest.mark.parametrize(("t", "count"), [(-3.9, 1), (-1.75, 2)], ids=["beside the lane", "on the lane"])
+def test_walls_of_the_map_are_objects_on_lanes_only(street: Any, t: float, count: int) -> None:
+    """A wall of the map, 4 m long, from 3.7 m to 4.1 m beside the center of the road as in a tunnel, or on the lane."""
+    wall = f'''<objects><object id="1" type="barrier" s="58" t="{t}" zOffset="0" hdg="0" length="4" width="0.4"
+    height="2"/></objects>'''
+    roads = RoadNetwork.parse(map_xml(road_xml(x=-50.0, extra=wall)))
+    ego, car = street.thing("Ego", -4.0, -1.75), street.thing("Car", 6.0, 1.75, math.pi)
+    detections = detect_on_roads(street, roads, ego, car)
+    assert len(detections) == count
+    assert detections.classes[nearest(detections, car.box)] == "car"
+
+
 def test_detect_with_two_lidars_returns_each_object_once(street: Any) -> None:
     objects = [street.thing("Ego", 0, 0), street.thing("Ahead", 15, 0)]
     one = street.readings(objects, {"roof": CLEAN})

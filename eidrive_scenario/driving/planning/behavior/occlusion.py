@@ -16,7 +16,7 @@ from eidrive_scenario.driving.planning.behavior.conflict_ways import UPSTREAM, C
 from eidrive_scenario.driving.planning.behavior.proposals import BEFORE_ZONE, Body, time_to_gain
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.world.road_objects import buildings, road_object_bodies
+from eidrive_scenario.world.road_objects import solid_boxes
 
 CREEP = 1.39
 """Speed at which the vehicle moves on until it has a view [m/s], that of Autoware before occluded junctions."""
@@ -45,13 +45,7 @@ class Occluders(msgspec.Struct, frozen=True):
     @classmethod
     def of_map(cls, roads: RoadNetwork) -> Occluders:
         """Return the buildings and solid objects of a map that are higher than hidden traffic."""
-        boxes = [(*house.center, *house.size, house.yaw) for house in buildings(roads)]
-        for body in road_object_bodies(roads):
-            if body.solid and body.height > TARGET_HEIGHT:
-                length, width = (2.0 * body.radius,) * 2 if body.radius else (body.length, body.width)
-                pose = body.pose
-                boxes.append((pose.x, pose.y, pose.z + body.height / 2.0, length, width, body.height, pose.h))
-        return cls.of_boxes(np.array(boxes, dtype=float))
+        return cls.of_boxes(solid_boxes(roads, TARGET_HEIGHT))
 
     def near(self, x: float, y: float, distance: float) -> Occluders:
         """Return those whose centers are within a distance of a place [m], plus their own extent."""
