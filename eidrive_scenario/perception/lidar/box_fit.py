@@ -101,7 +101,8 @@ class Span(NamedTuple):
     low: float
     high: float
     gap: float
-    """Maximum extent of the object beyond its points; inf if the side along this axis is not visible [m]."""
+    """Maximum extent of the object beyond its points at an end that nothing hides; inf if the side along this axis is
+    not visible [m]."""
     open_low: bool
     """Whether the object may extend beyond its points at either end."""
     open_high: bool
@@ -142,7 +143,10 @@ def complete_span(span: Span, mean: float, deviation: float) -> tuple[float, flo
     if span.open_low == span.open_high:
         unseen = size - measured
         return size, (span.low + span.high) / 2.0, unseen**2 / 12.0 + RANGE_NOISE**2
-    middle = span.low + size / 2.0 if span.open_high else span.high - size / 2.0
+    # Beyond the end that is not hidden, the object may extend by the gap, at most by what is unseen of it.
+    beyond = min(span.gap, size - measured) if span.hidden else 0.0
+    spread += beyond**2 / 3.0
+    middle = span.low + (size - beyond) / 2.0 if span.open_high else span.high - (size - beyond) / 2.0
     # If the side was missed, the middle of the points is as likely that of the object.
     offset = (size - measured) / 2.0 if span.may_miss else 0.0
     return size, middle, spread / 4.0 + offset**2 + RANGE_NOISE**2
@@ -351,7 +355,8 @@ def _spans(
         if depth <= THIN < high - low:
             # Only the side along this axis is hit: the object may extend beyond its points at the near end as well.
             open_low = open_high = True
-        if high - low <= THIN < depth:
+        middle = float(np.median(points[:, :2] @ (ax, ay)))
+        if min(high - low, 2.0 * min(middle - low, high - middle)) <= THIN < depth:
             # A side across this axis faces the sensor and ends the object, even if something hides more of it.
             ends = ends[0] and open_low, ends[1] and open_high
         if any(cut):
@@ -359,6 +364,9 @@ def _spans(
             at_low, at_high = _ends_of(points[:, :2], (ax, ay), low, high, cut)
             ends = ends[0] or (at_low and open_low), ends[1] or (at_high and open_high)
         if any(ends):
+            # The other end is exact if the side there is visible.
+            exact = depth > THIN and not ((ends[0] and open_high) or (ends[1] and open_low))
+            spacing = 0.0 if exact else spacing
             open_low, open_high = ends
         gap = spacing * (2.0 if open_low and open_high else 1.0)
         may_miss = 0.0 < gaps[axis] < gaps[1 - axis] and pattern.azimuth * distance**2 / gaps[axis] > depth

@@ -97,14 +97,18 @@ def test_fit_box_of_rear_is_completed_away_from_sensor() -> None:
 
 
 def test_fit_box_hidden_end_is_completed_behind_occluder() -> None:
-    """The front 2 m of a car that crosses from the left; a truck hides the rest, so the left end is hidden."""
+    """The front 2 m of a car that crosses from the left; a truck hides the rest, so the left end is hidden.
+
+    The other end is anywhere in the gap before the next column of rays, 20 m away and 1° aside.
+    """
     flank = np.column_stack([np.full(21, 20.0), np.linspace(-1.0, 1.0, 21)])
     left, right, none = (
         fit(standing(flank, 1.5), hidden=flags, classes=("car",))
         for flags in ((True, False), (False, True), (False, False))
     )
-    assert left.box[1] == pytest.approx(-1.0 + 2.3, abs=0.1)
-    assert right.box[1] == pytest.approx(1.0 - 2.3, abs=0.1)
+    gap = 20.0 * math.radians(1.0)
+    assert left.box[1] == pytest.approx(-1.0 - gap / 2.0 + 2.3, abs=0.05)
+    assert right.box[1] == pytest.approx(1.0 + gap / 2.0 - 2.3, abs=0.05)
     assert none.box[1] == pytest.approx(0.0, abs=0.05)
 
 
@@ -210,6 +214,16 @@ def test_fit_box_of_grazed_flank_is_behind_visible_side(side: float, hidden: tup
     assert side * found.box[1] - across / 2.0 == pytest.approx(0.6, abs=0.1)
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_flank_below_sloping_windows_ends_the_body(side: float) -> None:
+    """The flank of a van 5.2 m beside the own way, partly hidden by the next one in a row; windows slope by 0.55 m."""
+    flank = np.column_stack([np.linspace(15.0, 20.0, 26), np.full(26, side * 5.2)])
+    windows = np.column_stack([np.linspace(15.0, 20.0, 26), np.full(26, side * 5.75), np.full(26, 2.3)])
+    points = np.concatenate([standing(flank, 1.4), windows])
+    found = fit(points, hidden=(side > 0.0, side < 0.0), classes=("van",))
+    assert side * found.box[1] - found.box[4] / 2.0 == pytest.approx(5.2, abs=0.05)
+
+
 @pytest.mark.parametrize("first", [2.65, 2.95, 3.2])
 def test_missed_side_of_an_oncoming_car_is_within_the_stated_deviation(first: float) -> None:
     """Rays 1.05 m apart meet the front and the hood of a car 1.8 m wide at y = 3.5, and may pass its side, which is
@@ -229,8 +243,9 @@ def test_fit_box_of_single_column_beside_occluder_extends_behind_it(seed: int) -
         fit(standing(plan, 1.5), hidden=flags, classes=("car",), heading=math.pi / 2.0)
         for flags in ((True, False), (False, True))
     )
-    assert left.box[1] == pytest.approx(2.3, abs=0.1)
-    assert right.box[1] == pytest.approx(-2.3, abs=0.1)
+    gap = 20.0 * math.radians(1.0)
+    assert left.box[1] == pytest.approx(2.3 - gap / 2.0, abs=0.05)
+    assert right.box[1] == pytest.approx(gap / 2.0 - 2.3, abs=0.05)
 
 
 def test_distances_to_the_nearer_edges_equal_those_of_turned_points() -> None:
