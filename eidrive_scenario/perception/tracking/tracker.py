@@ -273,10 +273,7 @@ class Tracker(TrackingMethod):
             history.parts += 1
             # If most boxes are so short, the first ones were too long: those of distant objects rest on few points.
             is_part[number] = 2 * history.parts <= history.hits + 1
-        differs = is_part | (confirmed & (np.abs(np.cos(boxes[:, 6] - shape[:, 4])) < ACROSS))
-        noise = noise[columns]
-        if differs.any():
-            noise[differs] += _extent_noise(shape[differs], boxes[differs])
+        noise = noise[columns] + _extent_noise(shape, boxes)
         self._tracks = self._filter.share_pose_change(self._tracks, rows, boxes, noise)
         tracks = self._filter.update(self._tracks.take(rows), boxes, noise)
         self._tracks.put(rows, tracks)
@@ -352,9 +349,8 @@ def _extent_noise(shape: Array, boxes: Array) -> Array:
     The same visible corner belongs to both: along each axis of the track, the centers differ by half the difference of
     the extents.
     """
-    turn = boxes[:, 6] - shape[:, 4]
-    along, across = np.abs(np.cos(turn)), np.abs(np.sin(turn))
-    extent = np.stack([along * boxes[:, 3] + across * boxes[:, 4], across * boxes[:, 3] + along * boxes[:, 4]], -1)
+    is_across = np.abs(np.cos(boxes[:, 6] - shape[:, 4])) < ACROSS
+    extent = np.where(is_across[:, None], boxes[:, [4, 3]], boxes[:, 3:5])
     axes = _axes(shape[:, 4])
     return np.asarray(np.einsum("nai,na,nak->nik", axes, np.square(shape[:, 1:3] - extent) / 4.0, axes))
 

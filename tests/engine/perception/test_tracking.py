@@ -380,6 +380,18 @@ def test_new_vehicle_moves_across_its_axis_only_if_that_is_certain(yaw: float) -
     assert reported.velocity[0, 1] == pytest.approx(0.0, abs=1e-9) or yaw != 0.0
 
 
+@pytest.mark.parametrize("kind", ["cv", "ctrv"])
+def test_growing_box_of_standing_car_is_no_motion(kind: str) -> None:
+    """Of a car that stands a corner is visible, 0.5 m long, then 1.5 m, and then all of it."""
+    track, corner = tracker(kind), (20.0, 3.0)
+    for tick, (length, width) in enumerate([(0.5, 0.5), (1.5, 0.8), *[(4.6, 1.8)] * 10]):
+        detections = cars(tick * DT, (corner[0] + length / 2.0, corner[1] + width / 2.0))
+        detections.boxes[:, 3:5] = length, width
+        objects = track.update(detections)
+        assert np.all(np.hypot(*objects.velocity.T) < 1.0)
+    assert objects.boxes[0, :2] == pytest.approx((22.3, 3.9), abs=0.2)
+
+
 def test_position_of_standing_object_stays_as_uncertain_as_common_errors() -> None:
     """300 boxes of a standard deviation of 3 m, all of them 3 m too near, are no precise position: a better sensor is
     believed at once."""
