@@ -18,7 +18,7 @@ class BehaviorSettings(PlannerSettings):
     time_gap, standstill_gap, acceleration  [s], [m], [m/s²] parameters of the Intelligent Driver Model, by default
                             those that its author advises (Treiber, movsim/traffic-simulation-de)
     comfortable_deceleration  its comfortable deceleration [m/s²]
-    passing_gap             additional gap behind a standing vehicle, from which the vehicle can pass it [m]
+    passing_gap             additional gap behind what stands, from which the vehicle can pass it [m]
     hard_deceleration       maximum braking without an emergency; nuPlan's limit of comfort is 4.05 [m/s²]
     emergency_deceleration  braking in an emergency, at most that of the vehicle [m/s²]
     lateral_acceleration    maximum in curves and lane changes [m/s²]

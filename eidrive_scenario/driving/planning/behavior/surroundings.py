@@ -10,7 +10,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools, Integers
 from eidrive_scenario.base.detections import VULNERABLE
-from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, KnownObject
+from eidrive_scenario.driving.planning.behavior.memory import KnownObject
 from eidrive_scenario.driving.planning.behavior.prediction import Prediction
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import Passage
@@ -48,7 +48,7 @@ class Surroundings(msgspec.Struct, frozen=True, dict=True):
 
     s, d, half_length, half_width  (N, K) [m];  speed  (N, K) along the line [m/s];  margin  (N,) to the side [m]
     owner  (N,) index of the object;  certain  (N,) whether its existence is certain enough for hard braking
-    passing_gap  (N,) additional gap behind standing vehicles [m]
+    passing_gap  (N,) additional gap behind what stands [m]
     crosses  (N, K) whether it moves across the line;  behind  (N,) whether it follows the ego in its lane
     yields   (N,) whether the ego gives way to it at a junction
     """
@@ -152,9 +152,7 @@ def surroundings(
         margin,
         prediction.objects,
         np.array([owner.existence >= settings.min_existence for owner in owners], dtype=bool),
-        np.array(
-            [settings.passing_gap * (owner.still_since is not None and owner.kind not in ON_FOOT) for owner in owners]
-        ),
+        np.array([settings.passing_gap * (owner.still_since is not None) for owner in owners]),
         moving & (ahead < ACROSS),
         behind,
         _yields(prediction, gives_way),

@@ -84,8 +84,8 @@ def test_possible_existence_and_min_existence_are_settings(roads: RoadNetwork) -
 
 def test_distant_ghost_is_approached_as_an_object(roads: RoadNetwork) -> None:
     """Comfortable braking is sufficient, so that the probability makes little difference."""
-    ghost = drive(roads, lambda now: [PEDESTRIAN._replace(score=0.3)], 25.0)
-    certain = drive(roads, lambda now: [PEDESTRIAN], 25.0)
+    ghost = drive(roads, lambda now: [PEDESTRIAN._replace(score=0.3)], 25.0, lane_changes=False)
+    certain = drive(roads, lambda now: [PEDESTRIAN], 25.0, lane_changes=False)
     assert ghost.speeds[-1] < 0.1
     assert ghost.front == pytest.approx(certain.front, abs=0.5)
 
@@ -94,13 +94,13 @@ def test_distant_ghost_is_approached_as_an_object(roads: RoadNetwork) -> None:
 @pytest.mark.parametrize("deviation", [0.5, 1.0])
 def test_doubled_covariance_increases_the_gap_by_its_growth(roads: RoadNetwork, deviation: float) -> None:
     fronts = [
-        drive(roads, lambda now, d=d: [PEDESTRIAN._replace(deviation=d)], 14.0).front  # type: ignore[misc]
+        drive(roads, lambda now, d=d: [PEDESTRIAN._replace(deviation=d)], 14.0, lane_changes=False).front  # type: ignore[misc]
         for d in (deviation, deviation * math.sqrt(2.0))
     ]
     growth = DEFAULTS.uncertainty * deviation * (math.sqrt(2.0) - 1.0)
     assert fronts[0] - fronts[1] == pytest.approx(growth, abs=0.2)
-    # With a known position the car stops the standstill gap before the pedestrian.
-    expected = 90.0 - 0.25 - DEFAULTS.uncertainty * deviation - DEFAULTS.standstill_gap
+    # With a known position the car stops where it could pass the pedestrian.
+    expected = 90.0 - 0.25 - DEFAULTS.uncertainty * deviation - DEFAULTS.standstill_gap - DEFAULTS.passing_gap
     assert fronts[0] == pytest.approx(expected, abs=0.6)
 
 

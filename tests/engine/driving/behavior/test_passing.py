@@ -112,12 +112,13 @@ def test_vehicle_that_appears_nearer_than_the_place_with_a_view_passes() -> None
     assert run.front > 60.0
 
 
-def test_standing_motorbike_is_passed() -> None:
+@pytest.mark.parametrize(("kind", "size"), [("motorbike", (2.2, 0.8)), ("pedestrian", (0.5, 0.5))])
+def test_standing_road_user_is_passed(kind: str, size: tuple[float, float]) -> None:
     """The vehicle stops `passing_gap` farther away than the standstill gap of 2 m, and then passes."""
-    bike = KnownBox(70.0, kind="motorbike", size=(2.2, 0.8))
+    other = KnownBox(70.0, kind=kind, size=size)
     roads = two_lane_road()
     run = PlannedDrive(behavior(roads), roads)
-    run.run(26.0, lambda now: [bike])
+    run.run(26.0, lambda now: [other])
     run.world.close()
     assert run.front > 120.0
 
