@@ -322,11 +322,8 @@ def _with_space(points: Sequence[Point], space: Sequence[Axis]) -> Sequence[Poin
     return [{**point, **start, name: value} for point in points for name, value in ends]
 
 
-_ONE_OF_BOTH = "remove the option or the axis"
-
-
 def _check_names_of_runs(scenario: Path, points: Sequence[Point], settings: RunSettings, is_distribution: bool) -> None:
-    """Raise SettingError if an axis has the name of the runs of a distribution, or replaces a setting of all runs.
+    """Raise SettingError if an axis has the name of the runs of a distribution.
 
     So does an axis or a setting of all runs with the name of a parameter that the distribution varies.
     """
@@ -335,13 +332,6 @@ def _check_names_of_runs(scenario: Path, points: Sequence[Point], settings: RunS
         hint = f"give {PARAMETER}{RUN} for a parameter of this name; all runs of a distribution are executed"
         raise SettingError(Diagnostic(f"--vary: {RUN!r} is the number of a run of a distribution", hint))
     given = dict.fromkeys(settings.parameters, "RunSettings.parameters")
-    for name in names:
-        parameter = name.removeprefix(PARAMETER)
-        if name in SETTINGS and getattr(settings, name) != getattr(RunSettings(), name):
-            raise SettingError(Diagnostic(f"RunSettings.{name} has no effect: an axis has this name", _ONE_OF_BOTH))
-        if not is_setting(name) and parameter in settings.parameters:
-            message = f"RunSettings.parameters: {parameter!r} has no effect: an axis has this name"
-            raise SettingError(Diagnostic(message, _ONE_OF_BOTH))
     given |= {name.removeprefix(PARAMETER): "--vary" for name in names if not is_setting(name)}
     for name, element in load_distribution(scenario).varied.names.items() if is_distribution else ():
         if name in given:

@@ -148,14 +148,6 @@ def test_results_combine_stores(eidrive: Eidrive, store: Path, tmp_path: Path) -
         (("sweep", "{scenario}", "--store", "s.db", "--find-boundary", "Speed=1,2"), "not an interval"),
         (("sweep", "{scenario}", "--store", "s.db", "--find-boundary", "Speed=2:1"), "--find-boundary: 'Speed=2:1'"),
         (("sweep", "{scenario}", "--store", "s.db", "--falsify"), "without --vary"),
-        (
-            ("sweep", "{scenario}", "--store", "s.db", "--vary", "Speed=1,2", "--param", "Speed=3"),
-            "--param: 'Speed' has no effect: an axis has this name",
-        ),
-        (
-            ("sweep", "{scenario}", "--store", "s.db", "--find-boundary", "time_limit=1:2", "--time-limit", "3"),
-            "--time-limit has no effect: an axis has this name",
-        ),
         (("sweep", "{scenario}", "--store", "s.db", "--find-boundary", "Speed=1:2", "--seeds", "5"), "--seeds"),
         (
             ("sweep", "{scenario}", "--store", "s.db", "--find-boundary", "Speed=1:2", "--vary", "Speed=1"),
