@@ -417,6 +417,18 @@ def test_velocity_of_pedestrian_after_standstill_follows_at_once() -> None:
     assert speeds["car"] < 0.2
 
 
+@pytest.mark.parametrize(
+    ("name", "counts"), [("pedestrian", True), ("bicycle", True), ("car", False), ("motorbike", False)]
+)
+def test_four_positions_are_a_motion_of_slow_road_users_only(name: str, counts: bool) -> None:
+    """0.3 m per scan with errors of 0.3 m: the line of regression through four positions has a slope of 3 m/s, and a
+    deviation of 0.3 m / (0.1 s · sqrt(5)) = 1.3 m/s. Three deviations are a certain motion."""
+    track = tracker()
+    for scan in range(4):
+        held = track.update(cars(DT * scan, (20.0, 0.3 * scan), deviation=0.3, names=(name,)))
+    assert (np.hypot(*held.velocity[0]) > 1.0) == counts
+
+
 def test_size_of_a_track_follows_when_most_boxes_are_shorter() -> None:
     """Six distant boxes of a crate have the length of a car, 4.6 m; all later ones have its 1 m. Up to six of them may
     show a part of a car."""
