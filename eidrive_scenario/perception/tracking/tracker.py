@@ -90,7 +90,7 @@ LARGEST_OVERLAP = 0.1
 """Maximum overlap of two bodies (intersection over union) by errors of their boxes: 0.8 m of two cars in a row."""
 SETTLED = 6
 """Number of detections of a track from which on its velocity counts whatever its uncertainty: half a second."""
-EARLY = frozenset({"pedestrian", "bicycle"})
+SLOW = frozenset({"pedestrian", "bicycle"})
 """Classes whose velocity counts from the first detections: they are slow, and set off at once. Motorbikes are as fast
 as cars, and partly visible cars resemble them."""
 SMOOTHING = 0.2
@@ -331,7 +331,7 @@ class Tracker(TrackingMethod):
     def _report(self, time: float, rows: list[int], tracks: Tracks, existence: Array) -> Detections:
         histories = [self._histories[row] for row in rows]
         state, covariance = self._filter.combined(tracks)
-        recent = np.array([history.hits < SETTLED and history.name not in EARLY for history in histories], dtype=bool)
+        recent = np.array([history.hits < SETTLED and history.name not in SLOW for history in histories], dtype=bool)
         return Detections(
             time,
             self._boxes(rows, state),

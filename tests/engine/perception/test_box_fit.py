@@ -220,8 +220,8 @@ def test_flank_below_sloping_windows_ends_the_body(side: float) -> None:
     flank = np.column_stack([np.linspace(15.0, 20.0, 26), np.full(26, side * 5.2)])
     windows = np.column_stack([np.linspace(15.0, 20.0, 26), np.full(26, side * 5.75), np.full(26, 2.3)])
     points = np.concatenate([standing(flank, 1.4), windows])
-    found = fit(points, hidden=(side > 0.0, side < 0.0), classes=("van",))
-    assert side * found.box[1] - found.box[4] / 2.0 == pytest.approx(5.2, abs=0.05)
+    van = fit(points, hidden=(side > 0.0, side < 0.0), classes=("van",))
+    assert side * van.box[1] - van.box[4] / 2.0 == pytest.approx(5.2, abs=0.05)
 
 
 @pytest.mark.parametrize("first", [2.65, 2.95, 3.2])
