@@ -16,6 +16,7 @@ from eidrive_scenario.driving.planning.behavior.maneuvers import (
     extended,
     may_pass,
     passing_profiles,
+    shortened,
 )
 from eidrive_scenario.driving.planning.behavior.merging import (
     MERGING_TIME_GAP,
@@ -108,6 +109,8 @@ def _threat(options: Options, emergency: int) -> int | None:
 
 OFF_PROFILE = 0.8
 """Distance from the current profile above which the vehicle starts a new one from its position [m]."""
+RETURN_GAP = 2.0
+"""Additional gap behind what stands where the vehicle returns to its lane, from which it can just pass that [m]."""
 SATISFIED = 0.85
 """Share of the wanted progress from which on no other maneuver is considered; a choice, as the next two times."""
 DWELL = 2.0
@@ -197,6 +200,8 @@ class Decider:
             profiles.append(self._to_route(situation))
         if current.uses_oncoming and (given_up := self._given_up(situation, scene, current)) is not None:
             profiles.append(given_up)
+        if current.uses_oncoming and (early := shortened(situation, scene, current)) is not None:
+            profiles.append(early)
         change = situation.change
         merges = change is not None and current.name == change.name
         self._time_gap.update(scene, (situation.s, situation.d), self._body, merges=merges)
@@ -238,8 +243,8 @@ class Decider:
 
     def _scene(self, situation: Situation, settings: BehaviorSettings) -> Surroundings:
         if abs(situation.steered[1]) > OFF_PROFILE:
-            # A vehicle that returns behind an obstacle needs all the space.
-            settings = settings.model_copy(update={"passing_gap": 0.0})
+            # A vehicle that returns behind an obstacle needs the space.
+            settings = settings.model_copy(update={"passing_gap": min(settings.passing_gap, RETURN_GAP)})
         return surroundings(
             situation.objects,
             situation.prediction,
@@ -385,6 +390,9 @@ class Decider:
                     walls = [*holds, *crossing_walls(crossing, self._times, here, kind, reasons), *stops]
                     reactions[kind] = walls, leading(scene, way, crossing, situation.center, kind)
                 time_gap = MERGING_TIME_GAP if merges else self._time_gap.value
+                is_passing = self._passes and profile.uses_oncoming and not profile.overtakes
+                if is_passing and not (reactions[kind][1] & (scene.speed > ONCOMING_SPEED)).any():
+                    time_gap = 0.0  # It leaves the oncoming lane soon, before what stands there.
                 if profile.gives_up:
                     time_gap = 0.0  # It falls behind a vehicle that is faster than it is then.
                 if verdict is Verdict.FOLLOW:

@@ -27,6 +27,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     Start,
     Wall,
     change_length,
+    least_length,
     passing,
     time_to_gain,
     to_lane,
@@ -348,6 +349,28 @@ def extended(situation: Situation, scene: Surroundings, profile: LateralProfile)
     back = _length_at(situation, obstacle.end, value, is_hasty=value > profile.border)
     places = (*profile.places[:-2], obstacle.end, obstacle.end + back)
     return msgspec.structs.replace(profile, places=places)
+
+
+def shortened(situation: Situation, scene: Surroundings, profile: LateralProfile) -> LateralProfile | None:
+    """Return a profile past an obstacle with its way back before what stands behind that; None if nothing does, or
+    without space for it."""
+    if len(profile.places) < 3 or profile.last != 0.0:
+        return None
+    *_, before, end, back = profile.places
+    overhang = situation.body.front - situation.body.wheelbase
+    rears = [
+        hypothesis.rear - overhang
+        for hypothesis in scene.present
+        if end < hypothesis.rear - overhang < back
+        and abs(hypothesis.speed) < WAITING
+        and not hypothesis.crosses
+        and _is_in_way(situation, hypothesis)
+    ]
+    place = min(rears, default=math.inf)
+    end = max(before + 0.5, end - BEFORE_OBSTACLE, situation.steered[0])
+    if back <= place or place - end < float(least_length(np.array(abs(profile.values[-2])))):
+        return None
+    return msgspec.structs.replace(profile, places=(*profile.places[:-2], end, place))
 
 
 def _head_on(situation: Situation, scene: Surroundings) -> Present | None:

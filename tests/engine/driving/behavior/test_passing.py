@@ -90,6 +90,33 @@ def test_pass_ends_behind_parked_cars_that_come_into_view() -> None:
     assert min(speed for place, _, speed in run.path if 80.0 < place < 112.0) > 3.0
 
 
+@pytest.mark.parametrize("gap", [20.0, 25.0])
+def test_vehicle_returns_before_a_pedestrian_behind_the_passed_truck(gap: float) -> None:
+    """When the vehicle leaves its lane, the pedestrian and a car 112 m ahead come into view. A stop beside the truck would
+    be in the way of that car; behind the truck there is space for the vehicle, which is 5 m long."""
+    truck = KnownBox(100.0, kind="truck", size=(8.5, 2.6))
+    pedestrian = KnownBox(104.25 + gap, kind="pedestrian", size=(0.5, 0.5))
+    roads = two_lane_road(400.0)
+    run = PlannedDrive(behavior(roads), roads)
+    in_view: list[float] = []
+
+    def car(now: float) -> KnownBox:
+        return KnownBox(197.0 - 12.0 * (now - in_view[0]), -LANE, vx=-12.0, yaw=math.pi)
+
+    def objects(now: float) -> list[KnownBox]:
+        if not in_view and run.path and run.path[-1][0] > 85.0:
+            in_view.append(now)
+        return [truck, pedestrian, car(now)] if in_view else [truck]
+
+    run.run(40.0, objects)
+    run.world.close()
+    beside = [
+        y for tick, (x, y, _) in enumerate(run.path) if in_view and abs(car(0.05 * tick).x - x - CAR.offset[0]) < 4.8
+    ]
+    assert max(beside) + CAR.size[1] / 2.0 < -LANE - 0.9
+    assert run.front > 130.0
+
+
 def test_standing_bus_is_passed_with_one_meter_between() -> None:
     """Its side is 1.25 m left of the middle of the lane; the car is half as wide as its box."""
     bus = KnownBox(120.0, kind="bus", size=(12.0, 2.5))
