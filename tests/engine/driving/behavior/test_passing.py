@@ -92,8 +92,8 @@ def test_pass_ends_behind_parked_cars_that_come_into_view() -> None:
 
 @pytest.mark.parametrize("gap", [20.0, 25.0])
 def test_vehicle_returns_before_a_pedestrian_behind_the_passed_truck(gap: float) -> None:
-    """When the vehicle leaves its lane, the pedestrian and a car 112 m ahead come into view. A stop beside the truck would
-    be in the way of that car; behind the truck there is space for the vehicle, which is 5 m long."""
+    """When the vehicle leaves its lane, the pedestrian and a car 112 m ahead come into view. Beside
+    the truck it would be in the way of that car; between both there is space for it, 5 m long."""
     truck = KnownBox(100.0, kind="truck", size=(8.5, 2.6))
     pedestrian = KnownBox(104.25 + gap, kind="pedestrian", size=(0.5, 0.5))
     roads = two_lane_road(400.0)
