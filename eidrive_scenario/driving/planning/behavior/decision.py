@@ -18,6 +18,7 @@ from eidrive_scenario.driving.planning.behavior.maneuvers import (
     passing_profiles,
     shortened,
 )
+from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT
 from eidrive_scenario.driving.planning.behavior.merging import (
     MERGING_TIME_GAP,
     TimeGap,
@@ -215,7 +216,7 @@ class Decider:
         self._held_up = settings.lane_changes and len(scene) > 0 and self._is_held_up(situation, options, best)
         passes = self._current is not None and self._current.uses_oncoming
         self._oncoming.observe(
-            scene,
+            scene.rows(np.flatnonzero([situation.kind_of(owner) not in ON_FOOT for owner in scene.owner])),
             situation.center,
             situation.wanted,
             situation.now,

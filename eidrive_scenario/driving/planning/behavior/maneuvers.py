@@ -417,7 +417,8 @@ def _evasions(situation: Situation, scene: Surroundings, head_on: Present) -> li
 def _meeting(situation: Situation, head_on: Present) -> _Obstacle:
     """Return an oncoming object between the places at which the vehicle should be aside [m]."""
     gap = max(head_on.rear - situation.front, 0.0)
-    way = gap * situation.speed / (situation.speed - head_on.speed)
+    speed = max(situation.speed, WALKING_PACE)
+    way = gap * speed / (speed - head_on.speed)
     begin, end = situation.s + EARLY * way, situation.s + way + 2.0 * head_on.half_length
     end += situation.body.wheelbase + situation.body.rear + BEFORE_OBSTACLE
     return _Obstacle.between(begin, end, [head_on], situation)

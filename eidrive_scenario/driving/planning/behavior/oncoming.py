@@ -143,6 +143,7 @@ class OncomingTraffic:
     ) -> None:
         """Update by the objects at `now` [s].
 
+        scene    objects except pedestrians
         center   distance of the center of the vehicle along the line [m]
         wanted   wanted speed of the vehicle [m/s]
         held_up  whether the vehicle would pass something
@@ -150,6 +151,7 @@ class OncomingTraffic:
         """
         reach = np.fmax(LANES, abs(oncoming) + LANE_WIDTH / 2.0)
         is_oncoming = (scene.speed[:, 0] < -ONCOMING_SPEED) & (np.abs(scene.d[:, 0]) < reach)
+        is_oncoming &= ~(np.sign(oncoming) * scene.d[:, 0] < -LANE_WIDTH / 2.0)  # beside the lane of the vehicle
         is_oncoming &= scene.front[:, 0] > center
         if is_oncoming.any():
             self._last = now

@@ -117,6 +117,25 @@ def test_vehicle_returns_before_a_pedestrian_behind_the_passed_truck(gap: float)
     assert run.front > 130.0
 
 
+@pytest.mark.parametrize(("kind", "y"), [("pedestrian", LANE - 2.9), ("pedestrian", 3.9), ("bicycle", LANE - 2.9)])
+def test_oncoming_pedestrians_and_cyclists_beside_the_road_are_no_oncoming_traffic(kind: str, y: float) -> None:
+    """One is always ahead. From where the vehicle stops the bus hides the oncoming lane."""
+    bus = KnownBox(80.0, kind="bus", size=(12.0, 2.5))
+    roads = two_lane_road()
+    run = PlannedDrive(behavior(roads), roads)
+
+    def objects(now: float) -> list[KnownBox]:
+        walkers = (
+            KnownBox(90.0 + 10.0 * number - 1.4 * now, y, vx=-1.4, kind=kind, size=(0.5, 0.5), yaw=math.pi)
+            for number in range(12)
+        )
+        return [bus, *walkers]
+
+    run.run(36.0, objects)
+    run.world.close()
+    assert run.front > 130.0
+
+
 def test_standing_bus_is_passed_with_one_meter_between() -> None:
     """Its side is 1.25 m left of the middle of the lane; the car is half as wide as its box."""
     bus = KnownBox(120.0, kind="bus", size=(12.0, 2.5))
