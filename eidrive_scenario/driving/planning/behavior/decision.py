@@ -216,12 +216,13 @@ class Decider:
         self._held_up = settings.lane_changes and len(scene) > 0 and self._is_held_up(situation, options, best)
         passes = self._current is not None and self._current.uses_oncoming
         self._oncoming.observe(
-            scene.rows(np.flatnonzero([situation.kind_of(owner) not in ON_FOOT for owner in scene.owner])),
+            scene,
             situation.center,
             situation.wanted,
             situation.now,
             held_up=self._held_up or passes,
             oncoming=situation.lanes_ahead.oncoming,
+            on_foot=np.array([situation.kind_of(owner) in ON_FOOT for owner in scene.owner], dtype=bool),
         )
         if self._held_up:
             if not expects:
@@ -376,6 +377,7 @@ class Decider:
             crossing = conflicts(scene, way, situation.s)
             if profile.gives_up:
                 crossing = [conflict for conflict in crossing if conflict.crosses]
+            is_passing = self._passes and profile.uses_oncoming and not profile.overtakes
             reactions: dict[Precedence, tuple[list[Wall], Bools]] = {}
             for proposal in proposals_for(
                 number,
@@ -391,7 +393,6 @@ class Decider:
                     walls = [*holds, *crossing_walls(crossing, self._times, here, kind, reasons), *stops]
                     reactions[kind] = walls, leading(scene, way, crossing, situation.center, kind)
                 time_gap = MERGING_TIME_GAP if merges else self._time_gap.value
-                is_passing = self._passes and profile.uses_oncoming and not profile.overtakes
                 if is_passing and not (reactions[kind][1] & (scene.speed > ONCOMING_SPEED)).any():
                     time_gap = 0.0  # It leaves the oncoming lane soon, before what stands there.
                 if profile.gives_up:

@@ -17,6 +17,7 @@ from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, STILL, Kn
 from eidrive_scenario.driving.planning.behavior.merging import has_gap_now
 from eidrive_scenario.driving.planning.behavior.prediction import NOTICEABLE, Prediction
 from eidrive_scenario.driving.planning.behavior.proposals import (
+    AT_OFFSET,
     BEFORE_ZONE,
     HASTY,
     ONCOMING_SPEED,
@@ -352,11 +353,14 @@ def extended(situation: Situation, scene: Surroundings, profile: LateralProfile)
 
 
 def shortened(situation: Situation, scene: Surroundings, profile: LateralProfile) -> LateralProfile | None:
-    """Return a profile past an obstacle with its way back before what stands behind that; None if nothing does, or
-    without space for it."""
+    """Return a profile past an obstacle with its way back before what stands behind that; None if nothing does, without
+    space for it, or if the vehicle returns already."""
     if len(profile.places) < 3 or profile.last != 0.0:
         return None
     *_, before, end, back = profile.places
+    s, value = situation.steered[0], profile.values[-2]
+    if s > end and abs(profile.offset_at(s) - value) > AT_OFFSET:
+        return None
     overhang = situation.body.front - situation.body.wheelbase
     rears = [
         hypothesis.rear - overhang
@@ -366,11 +370,12 @@ def shortened(situation: Situation, scene: Surroundings, profile: LateralProfile
         and not hypothesis.crosses
         and _is_in_way(situation, hypothesis)
     ]
-    place = min(rears, default=math.inf)
-    end = max(before + 0.5, end - BEFORE_OBSTACLE, situation.steered[0])
-    if back <= place or place - end < float(least_length(np.array(abs(profile.values[-2])))):
+    if not rears:
         return None
-    return msgspec.structs.replace(profile, places=(*profile.places[:-2], end, place))
+    nearest, end = min(rears), max(before + 0.5, end - BEFORE_OBSTACLE, s)
+    if nearest - end < float(least_length(np.array(abs(value)))):
+        return None
+    return msgspec.structs.replace(profile, places=(*profile.places[:-2], end, nearest))
 
 
 def _head_on(situation: Situation, scene: Surroundings) -> Present | None:

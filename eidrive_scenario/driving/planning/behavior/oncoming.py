@@ -140,19 +140,20 @@ class OncomingTraffic:
         *,
         held_up: bool,
         oncoming: float = math.nan,
+        on_foot: Bools | bool = False,
     ) -> None:
         """Update by the objects at `now` [s].
 
-        scene    objects except pedestrians
         center   distance of the center of the vehicle along the line [m]
         wanted   wanted speed of the vehicle [m/s]
         held_up  whether the vehicle would pass something
         oncoming center of the lane of the opposite direction [m]; nan without one
+        on_foot  whether objects (N,) are pedestrians, who are no traffic
         """
         reach = np.fmax(LANES, abs(oncoming) + LANE_WIDTH / 2.0)
         is_oncoming = (scene.speed[:, 0] < -ONCOMING_SPEED) & (np.abs(scene.d[:, 0]) < reach)
         is_oncoming &= ~(np.sign(oncoming) * scene.d[:, 0] < -LANE_WIDTH / 2.0)  # beside the lane of the vehicle
-        is_oncoming &= scene.front[:, 0] > center
+        is_oncoming &= (scene.front[:, 0] > center) & np.logical_not(on_foot)
         if is_oncoming.any():
             self._last = now
             if self._free_to == math.inf:
