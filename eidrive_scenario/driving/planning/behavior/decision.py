@@ -34,6 +34,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     HASTY,
     ONCOMING_SPEED,
     ROUTE,
+    TOWARDS_GAP,
     WALKING_PACE,
     Body,
     LateralProfile,
@@ -378,6 +379,8 @@ class Decider:
             if profile.gives_up:
                 crossing = [conflict for conflict in crossing if conflict.crosses]
             is_passing = self._passes and profile.uses_oncoming and not profile.overtakes
+            # In another lane the vehicle would be too long.
+            follows = number == 0 and profile.side == 0 and len(scene) > 0
             reactions: dict[Precedence, tuple[list[Wall], Bools]] = {}
             for proposal in proposals_for(
                 number,
@@ -386,7 +389,7 @@ class Decider:
                 emergency=self._emergency,
                 gives_up=profile.gives_up,
                 is_current=number == 0,
-                seeks_gap=seeks_gap,
+                comfortable=TOWARDS_GAP if seeks_gap else (1.0,) if follows else (),
             ):
                 kind = proposal.precedence
                 if kind not in reactions:
@@ -420,7 +423,7 @@ class Decider:
             self._times,
             self._body,
             self._settings,
-            wanted=situation.wanted,
+            limits=SpeedLimits(situation.line.along, situation.limits, situation.wanted),
             kept=self._kept_names(situation),
             waiting=waiting,
             refused=refused,

@@ -299,7 +299,7 @@ class Proposal(msgspec.Struct, frozen=True):
     deceleration: float
     is_emergency: bool = False
     is_gentle: bool = False
-    """Whether it stops for an object whose existence is uncertain; it may come closer to others than it should."""
+    """Whether it stops with comfortable braking, whatever is ahead."""
 
 
 class Wall(msgspec.Struct, frozen=True):
@@ -399,19 +399,18 @@ def proposals_for(
     emergency: float,
     is_current: bool,
     gives_up: bool,
-    seeks_gap: bool,
+    comfortable: Sequence[float],
 ) -> list[Proposal]:
     """Return the proposals along one profile.
 
     emergency  deceleration of the emergency brake [m/s²];  is_current  whether they include stopping
-    seeks_gap  whether they include gently changed speeds, by which the vehicle comes beside a gap in another lane
+    comfortable  shares of the wanted speed of those that brake comfortably only
     """
     hard = settings.hard_deceleration
     kinds: tuple[Precedence, ...] = ("all", "earlier", "none") if any(c.crosses for c in conflicts) else ("all",)
     most = emergency if gives_up else hard
     made = [Proposal(profile, share, kind, most) for kind in kinds for share in SPEED_SHARES]
-    if seeks_gap:
-        made += [Proposal(profile, share, "all", settings.comfortable_deceleration) for share in TOWARDS_GAP]
+    made += [Proposal(profile, share, "all", settings.comfortable_deceleration) for share in comfortable]
     if is_current:
         made.append(Proposal(profile, 0.0, "all", hard))
         made.append(Proposal(profile, 0.0, "all", settings.comfortable_deceleration, is_gentle=True))

@@ -10,8 +10,9 @@ import msgspec
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools, Integers
+from eidrive_scenario.driving.planning.behavior.oncoming import STOPPING_ERROR
 from eidrive_scenario.driving.planning.behavior.proposals import ONCOMING_SPEED, Body, Option
-from eidrive_scenario.driving.planning.behavior.rollout import WALL, Rollout
+from eidrive_scenario.driving.planning.behavior.rollout import WALL, Rollout, SpeedLimits
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
@@ -26,6 +27,14 @@ FARTHER = 0.8
 LEAST_LACK = 0.3
 """Risk of a clearance that is just too small; it increases to 1 at a contact. A choice: a step, so that no option gains
 by a clearance that lacks a millimeter."""
+NEARER = 1.0
+"""Distance by which it may stop nearer to a standing object than its gap [m], where it can still pass it."""
+RESPONSE, SETTLED = 0.5, 1.5
+"""Response time of the vehicle, and time within which it has the distance that this requires [s]; choices."""
+TOO_FAST = 0.3
+"""Excess over a speed limit above which the vehicle has to brake harder [m/s]; that of rounding is smaller."""
+MOST_OVERRUN = 3.0
+"""Distance from which on a stop behind its place is not worse [m]; a choice."""
 OUT_OF_LANE = 0.5
 """Offset from the route from which on the vehicle is in the way of oncoming traffic, not that in its way [m]."""
 AT_REST = 0.1
@@ -40,10 +49,11 @@ class Weights(msgspec.Struct, frozen=True):
     aside, oncoming  per use of another lane, and of one of the opposite direction
     switch           for another maneuver than the current one
     slower           of a lower target speed than wanted, which decides between options that are otherwise alike
-    gentle           of a stop for an uncertain object, which is only chosen for such an object
+    gentle           of a comfortable stop where others go on; below that of hard braking (0.75)
     refused          for an oncoming lane that is not free, or beyond the end of a lane; above any progress
     stays            for a lane that the route leaves, where the vehicle may change; above those of the change
     gap              of the time until it may change, at its most urgent; as that of all progress
+    overrun          per meter of a stop behind its place, and of a hit at standstill
     view             in favor of a place with a view into the oncoming lane; above the progress to the obstacle
     crash            of a collision, above all other terms
     """
@@ -55,8 +65,9 @@ class Weights(msgspec.Struct, frozen=True):
     oncoming: float = 0.4
     switch: float = 0.3
     slower: float = 0.05
-    gentle: float = 50.0
+    gentle: float = 0.5
     refused: float = 20.0
+    overrun: float = 1.0
     view: float = 2.0
     stays: float = 1.0
     gap: float = 5.0
@@ -84,7 +95,7 @@ def evaluate(
     ego: Body,
     settings: BehaviorSettings,
     *,
-    wanted: float,
+    limits: SpeedLimits,
     kept: frozenset[str],
     waiting: Set[int] = frozenset(),
     refused: Set[int] = frozenset(),
@@ -92,7 +103,7 @@ def evaluate(
 ) -> Evaluation:
     """Return the evaluation of all options, which are in the order of their profiles.
 
-    wanted   wanted speed [m/s]
+    limits   speed limits along the line and the wanted speed
     kept     names of the maneuvers that are no change: the current one, and the route after a complete one
     waiting  profiles that end before an oncoming lane, for a view into it
     refused  profiles that use an oncoming lane that is not free
@@ -102,16 +113,17 @@ def evaluate(
     offsets = _offsets(options, rolled, ego)
     collision, risk = np.full(count, np.inf), np.zeros(count)
     impact, cause = np.zeros(count), np.full(count, -1)
+    is_hit = np.zeros(count, dtype=bool)
     near = _near(rolled, offsets, scene, ego)
     if near.size:
         stops = np.array([option.proposal.share == 0.0 for option in options])
-        touching, lack = _overlaps(rolled, offsets, stops, scene.rows(near), times, ego, settings)
+        touching, is_hit, lack = _overlaps(rolled, offsets, stops, scene.rows(near), times, ego, settings)
         risk = (lack.max(axis=1) * (1.0 - FARTHER * times / horizon)).max(axis=1)
         if touching.any():
             collision, step, cause = _first_event(touching, times)
             cause = np.where(cause >= 0, near[cause], -1)
             impact = np.where(np.isfinite(collision), rolled.speed[np.arange(count), step], 0.0)
-    far = max(wanted * horizon, 1.0)
+    far = max(limits.wanted * horizon, 1.0)
     progress = np.minimum(np.maximum((rolled.s[:, -1] - rolled.s[:, 0]) / far, 0.0), 1.0)
     slowing = (rolled.speed[:, 1:] - rolled.speed[:, :-1]) / (times[1:] - times[:-1])
     hardest = np.maximum(-slowing.min(axis=1) - COMFORTABLE, 0.0)
@@ -121,6 +133,7 @@ def evaluate(
     score -= WEIGHTS.crash * np.where(np.isfinite(collision), crash, 0.0)
     if late is not None:
         score -= late
+    score -= WEIGHTS.overrun * (_overrun(options, rolled, scene, limits, times, ego, settings) + is_hit)
     held = waiting | refused
     may_go = any(option.profile.uses_oncoming and option.proposal.profile not in held for option in options)
     values: list[float] = score.tolist()
@@ -134,6 +147,52 @@ def evaluate(
         lanes = WEIGHTS.aside * (profile.side != 0) + WEIGHTS.oncoming * profile.uses_oncoming
         values[index] -= lanes + WEIGHTS.switch * switches + WEIGHTS.refused * (proposal.profile in refused)
     return Evaluation(np.array(values), collision, risk, cause)
+
+
+def _overrun(
+    options: Sequence[Option],
+    rolled: Rollout,
+    scene: Surroundings,
+    limits: SpeedLimits,
+    times: Array,
+    ego: Body,
+    settings: BehaviorSettings,
+) -> Array:
+    """Return the distances (P,) by which options pass a place of waiting, or end too near to a standing leader [m].
+
+    Comfortable braking counts most where it leaves the vehicle too close to a leader or too fast.
+    """
+    later = times >= SETTLED
+    stop = scene.rear[:, -1] - scene.passing_gap - settings.standstill_gap - ego.front + NEARER
+    ahead = (scene.passing_gap > 0.0) & (stop > rolled.s[0, 0])
+    overrun = np.zeros(len(options))
+    if ahead.any():
+        leads = np.array([option.leads[:, -1] for option in options]) & ahead
+        overrun = np.where(leads, rolled.s[:, -1:] - stop, 0.0).max(axis=1, initial=0.0)
+    for index, option in enumerate(options):
+        proposal = option.proposal
+        for wall in option.walls:
+            waits = rolled.s[index][times < wall.until]
+            if waits.size:
+                overrun[index] = max(overrun[index], waits[-1] - max(wall.s, waits[0]) - STOPPING_ERROR)
+        if proposal.is_emergency:
+            overrun[index] = 0.0
+        elif proposal.deceleration < settings.hard_deceleration:
+            s, speed = rolled.s[index], rolled.speed[index]
+            is_fast = (speed > np.interp(s, limits.along, limits.values) + TOO_FAST)[later].any()
+            if is_fast or _is_close(option, s, speed, scene, later, ego, settings):
+                overrun[index] = MOST_OVERRUN
+    return np.asarray(np.minimum(overrun, MOST_OVERRUN))
+
+
+def _is_close(
+    option: Option, s: Array, speed: Array, scene: Surroundings, later: Bools, ego: Body, settings: BehaviorSettings
+) -> bool:
+    """Return whether the vehicle comes closer to a leader than its way in the response time, or stays `later` so close
+    that hard braking might not suffice if that brakes as hard (lemma 2 of RSS, without acceleration in this time)."""
+    other = np.clip(scene.speed, 0.0, speed)
+    needed = RESPONSE * speed + later * (speed**2 - other**2) / (2.0 * settings.hard_deceleration)
+    return bool((option.leads & (scene.rear - ego.front - s < needed)).any())
 
 
 def _offsets(options: Sequence[Option], rolled: Rollout, ego: Body) -> Array:
@@ -181,8 +240,9 @@ def _overlaps(
     times: Array,
     ego: Body,
     settings: BehaviorSettings,
-) -> tuple[Bools, Array]:
-    """Return where the bodies touch (P, N, K), and the lack of clearance (P, N, K) in [0, 1].
+) -> tuple[Bools, Bools, Array]:
+    """Return where the bodies touch (P, N, K), which options end at standstill in the way of oncoming objects (P,), and
+    the lack of clearance (P, N, K) in [0, 1].
 
     offsets  of the front and the rear axle (2, P, K) [m]; each determines the position of its half of the vehicle
     stops    whether a proposal stops as soon as possible (P,)
@@ -224,6 +284,7 @@ def _overlaps(
     at_rest = stands[:, None, :]
     counts = ~at_rest
     late: Bools | None = None
+    is_hit = np.zeros(len(touching), dtype=bool)
     if touching.any():
         head_on = (scene.speed < -ONCOMING_SPEED) & ~scene.crosses
         ignored = np.logical_or.reduce(touching[:, :, 0], axis=0) & ~head_on[:, 0]
@@ -237,9 +298,10 @@ def _overlaps(
         # of oncoming traffic that is in its own lane.
         is_aside = (np.abs(offsets).max(axis=0) > OUT_OF_LANE)[:, None, :]
         blameless = at_rest & (scene.speed != 0.0) & ~(crosses & scene.yields)[:, None] & ~(head_on & is_aside)
+        is_hit = (touching & blameless & head_on).any(axis=(1, 2))
         touching &= ~blameless
     lack = np.where(counts, np.minimum(lack, 1.0), 0.0)
-    return touching, lack if late is None else np.where(late, 1.0, lack)
+    return touching, is_hit, lack if late is None else np.where(late, 1.0, lack)
 
 
 def _shifted(values: Array, steps: int) -> Array:

@@ -186,7 +186,7 @@ def test_vehicle_that_sets_off_ends_walking_pace(roads: RoadNetwork) -> None:
     """A van at the roadside pulls out with 1 m/s² while the vehicle approaches it, 4 m behind."""
 
     def seen(now: float) -> Sequence[KnownBox]:
-        since = max(now - 14.0, 0.0)
+        since = max(now - 11.8, 0.0)
         box = PARKED._replace(x=PARKED.x + 0.5 * since**2, y=min(PARKED.y + 0.25 * since**2, LANE))
         return [box._replace(vx=since, vy=0.5 * since if box.y < LANE else 0.0), OPPOSITE]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.driving.planning.behavior.proposals import Body, LateralProfile, Option, Proposal, inside_way
-from eidrive_scenario.driving.planning.behavior.rollout import Rollout
+from eidrive_scenario.driving.planning.behavior.rollout import Rollout, SpeedLimits
 from eidrive_scenario.driving.planning.behavior.scoring import Evaluation, Options, evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
@@ -16,6 +16,7 @@ from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 TIMES = np.arange(0.0, 8.01, 0.25)
 SETTINGS = BehaviorSettings()
 SPEED = 10.0
+LIMITS = SpeedLimits(np.array([0.0, 1000.0]), np.array([SPEED, SPEED]), SPEED)
 
 
 def crossing_car(place: float, arrival: float, *, yields: bool) -> Surroundings:
@@ -45,7 +46,7 @@ def risk(arrival: float, *, yields: bool) -> float:
     way = inside_way(scene, route, body.half_width)
     options = [Option(Proposal(0, 1.0, "all", 4.0), route, [], way, SETTINGS.time_gap)]
     kept = frozenset({"route"})
-    evaluation = evaluate(options, rolled, scene, TIMES, body, SETTINGS, wanted=SPEED, kept=kept)
+    evaluation = evaluate(options, rolled, scene, TIMES, body, SETTINGS, limits=LIMITS, kept=kept)
     return float(evaluation.risk[0])
 
 
