@@ -72,7 +72,8 @@ BRAKING = 3.0
 STOPPING_ERROR = 0.5
 """Distance by which the vehicle may stop too late [m]."""
 SLOW, OVERRUN = 1.0, 0.3
-"""Speed below which the vehicle stops at the border [m/s], and distance by which it may be beyond it then [m]."""
+"""Speed below which the vehicle stops at the border [m/s], and distance by which it may be beyond it then, and on its
+way along the border to a place of waiting [m]."""
 DELAY = 0.3
 """Time until the vehicle brakes [s]."""
 BEHIND = 1.0
@@ -262,9 +263,10 @@ class OncomingTraffic:
         last = int(possible.argmin()) - 1 if not possible.all() else len(times) - 1
         if last < 0 and first == 0:
             return Verdict.GO
-        has_stopped = float(motion.speed[0]) < SLOW and side * float(offsets[0]) < border + OVERRUN
+        is_at_border = side * float(offsets[0]) < border + OVERRUN
+        waits = float(motion.speed[0]) < SLOW or float(motion.s[0]) + body.wheelbase < profile.waits_at < math.inf
         held = Verdict.FOLLOW if moves else Verdict.WAIT
-        refused = held if first or (has_stopped and not moves) else Verdict.GIVE_UP
+        refused = held if first or (is_at_border and waits and not moves) else Verdict.GIVE_UP
         end, until = return_s + body.front, back if is_current else back + RESERVE
         if math.isinf(back) or self._meets(profile, motion, scene, first, until, end):
             return refused

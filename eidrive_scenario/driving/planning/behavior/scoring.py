@@ -160,9 +160,11 @@ def _overrun(
 ) -> Array:
     """Return the distances (P,) by which options pass a place of waiting, or end too near to a standing leader [m].
 
-    Comfortable braking counts most where it leaves the vehicle too close to a leader or too fast.
+    A place so near that not even hard braking suffices is that of such a stop. Comfortable braking counts most where it
+    leaves the vehicle too close to a leader or too fast.
     """
     later = times >= SETTLED
+    nearest = rolled.s[0, 0] + rolled.speed[0, 0] ** 2 / (2.0 * settings.hard_deceleration)
     stop = scene.rear[:, -1] - scene.passing_gap - settings.standstill_gap - ego.front + NEARER
     ahead = (scene.passing_gap > 0.0) & (stop > rolled.s[0, 0])
     overrun = np.zeros(len(options))
@@ -174,7 +176,7 @@ def _overrun(
         for wall in option.walls:
             waits = rolled.s[index][times < wall.until]
             if waits.size:
-                overrun[index] = max(overrun[index], waits[-1] - max(wall.s, waits[0]) - STOPPING_ERROR)
+                overrun[index] = max(overrun[index], waits[-1] - max(wall.s, nearest) - STOPPING_ERROR)
         if proposal.is_emergency:
             overrun[index] = 0.0
         elif proposal.deceleration < settings.hard_deceleration:
