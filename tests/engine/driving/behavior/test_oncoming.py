@@ -219,6 +219,21 @@ def test_vehicle_waits_at_the_edge_of_its_lane_with_a_view() -> None:
     assert with_view(PASSING, too_near, SETTINGS, sufficient, 2.0) is None, "there is not enough space"
 
 
+@pytest.mark.parametrize(
+    ("offset", "waits_at", "expected"),
+    [(0.8, 10.0, Verdict.WAIT), (1.1, 10.0, Verdict.GIVE_UP), (0.8, math.inf, Verdict.GIVE_UP)],
+)
+def test_vehicle_before_its_place_of_waiting_may_cross_the_border_slightly(
+    offset: float, waits_at: float, expected: Verdict
+) -> None:
+    """It is 0.05 m or 0.35 m beyond the border at 0.75 m, and would meet a car before its return."""
+    places, values = (-30.0, -20.0, 10.0, 25.0, 50.0, 70.0), (offset, 0.65, 0.65, 3.0, 3.0, 0.0)
+    profile = LateralProfile("pass", places, values, side=1, border=0.75, waits_at=waits_at)
+    motion = Motion(10.0 * TIMES - 30.0, np.full(len(TIMES), 10.0))
+    outlook = Outlook(LINE, scene((40.0, 0.0, 0.0), (100.0, 3.5, -10.0)), BESIDE, 0.0)
+    assert traffic(150.0).verify(profile, motion, outlook, is_current=True) is expected
+
+
 @pytest.mark.parametrize("is_last_place", [True, False])
 def test_vehicle_without_any_view_begins_after_two_long_pauses(is_last_place: bool) -> None:
     """A truck 2.4 m ahead hides the lane near it; traffic at 10 m/s needs 10 + 100 / 12 m to stop."""

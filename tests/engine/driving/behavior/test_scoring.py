@@ -7,7 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.driving.planning.behavior.proposals import Body, LateralProfile, Option, Proposal, inside_way
+from eidrive_scenario.driving.planning.behavior.proposals import (
+    Body,
+    LateralProfile,
+    Option,
+    Proposal,
+    Wall,
+    inside_way,
+)
 from eidrive_scenario.driving.planning.behavior.rollout import Rollout, SpeedLimits
 from eidrive_scenario.driving.planning.behavior.scoring import Evaluation, Options, evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
@@ -60,6 +67,26 @@ def test_traffic_with_the_right_of_way_needs_a_larger_gap(
 ) -> None:
     assert (risk(arrival, yields=False) > 0.0) == without
     assert (risk(arrival, yields=True) > 0.0) == with_right_of_way
+
+
+@pytest.mark.parametrize(
+    ("deceleration", "place", "cost"),
+    # It stops after 25 m with 2 m/s², and after 12.5 m with 4 m/s²; 0.5 m too far is the error of a stop.
+    [(2.0, 24.5, 0.0), (2.0, 23.0, 1.5), (2.0, 10.0, 3.0), (4.0, 10.0, 0.0)],
+)
+def test_stop_behind_its_place_costs_by_distance_unless_none_is_possible(
+    deceleration: float, place: float, cost: float
+) -> None:
+    speed = np.maximum(SPEED - deceleration * TIMES, 0.0)
+    s = (SPEED**2 - speed**2) / (2.0 * deceleration)
+    rolled = Rollout(np.tile(s, (2, 1)), np.tile(speed, (2, 1)), np.full((2, 4), -1))
+    route, nothing = LateralProfile("route", (0.0,), (0.0,)), np.zeros((0, len(TIMES)), dtype=bool)
+    walls: tuple[list[Wall], ...] = ([], [Wall(place, math.inf, "stop line")])
+    options = [Option(Proposal(0, 1.0, "all", 4.0), route, wall, nothing, SETTINGS.time_gap) for wall in walls]
+    kept, body = frozenset({"route"}), Body(1.4, 2.4, 0.9, 2.85)
+    scene = crossing_car(0.0, 0.0, yields=True).rows(np.empty(0, dtype=np.intp))
+    free, stopped = evaluate(options, rolled, scene, TIMES, body, SETTINGS, limits=LIMITS, kept=kept).score
+    assert free - stopped == pytest.approx(cost)
 
 
 @pytest.mark.parametrize(
