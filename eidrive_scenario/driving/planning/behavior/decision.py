@@ -53,7 +53,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     towards,
     with_view,
 )
-from eidrive_scenario.driving.planning.behavior.rollout import BRISK, FREE, LIMIT, WALL, Roller, Rollout, SpeedLimits
+from eidrive_scenario.driving.planning.behavior.rollout import BRISK, FREE, LIMIT, WALL, Roller, Rollout
 from eidrive_scenario.driving.planning.behavior.scoring import AT_REST, URGENT, Options, evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, only_certain, surroundings
@@ -379,7 +379,7 @@ class Decider:
             if profile.gives_up:
                 crossing = [conflict for conflict in crossing if conflict.crosses]
             is_passing = self._passes and profile.uses_oncoming and not profile.overtakes
-            # In another lane the vehicle would be too long.
+            # A gentle motion through another lane would take too long.
             follows = number == 0 and profile.side == 0 and len(scene) > 0
             reactions: dict[Precedence, tuple[list[Wall], Bools]] = {}
             for proposal in proposals_for(
@@ -423,7 +423,7 @@ class Decider:
             self._times,
             self._body,
             self._settings,
-            limits=SpeedLimits(situation.line.along, situation.limits, situation.wanted),
+            limits=situation.speed_limits,
             kept=self._kept_names(situation),
             waiting=waiting,
             refused=refused,
@@ -440,8 +440,7 @@ class Decider:
         return Motion(rolled.s[0], rolled.speed[0])
 
     def _roll(self, situation: Situation, scene: Surroundings, options: list[Option]) -> Rollout:
-        limits = SpeedLimits(situation.line.along, situation.limits, situation.wanted)
-        return self._roller.roll(options, limits, situation.motion, self._body, scene)
+        return self._roller.roll(options, situation.speed_limits, situation.motion, self._body, scene)
 
     def _verified(
         self, situation: Situation, scene: Surroundings, profile: LateralProfile

@@ -35,6 +35,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
 )
 from eidrive_scenario.driving.planning.behavior.reference import LanesBeside, ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import Passage
+from eidrive_scenario.driving.planning.behavior.rollout import SpeedLimits
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Present, Surroundings
 
@@ -77,6 +78,11 @@ class Situation(msgspec.Struct, frozen=True):
     def junction(self) -> float:
         """Distance along the line at which the current or next junction begins [m]; inf without one."""
         return self.passages[0].start if self.passages else math.inf
+
+    @property
+    def speed_limits(self) -> SpeedLimits:
+        """Speed limits along the line, and the wanted speed."""
+        return SpeedLimits(self.line.along, self.limits, self.wanted)
 
     @property
     def motion(self) -> tuple[float, float]:

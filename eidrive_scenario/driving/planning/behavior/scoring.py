@@ -53,7 +53,8 @@ class Weights(msgspec.Struct, frozen=True):
     refused          for an oncoming lane that is not free, or beyond the end of a lane; above any progress
     stays            for a lane that the route leaves, where the vehicle may change; above those of the change
     gap              of the time until it may change, at its most urgent; as that of all progress
-    overrun          per meter of a stop behind its place, and of a hit at standstill
+    overrun          per meter of a stop behind its place
+    hit              of standstill where oncoming traffic hits the vehicle, without its fault
     view             in favor of a place with a view into the oncoming lane; above the progress to the obstacle
     crash            of a collision, above all other terms
     """
@@ -68,6 +69,7 @@ class Weights(msgspec.Struct, frozen=True):
     gentle: float = 0.5
     refused: float = 20.0
     overrun: float = 1.0
+    hit: float = 1.0
     view: float = 2.0
     stays: float = 1.0
     gap: float = 5.0
@@ -133,7 +135,7 @@ def evaluate(
     score -= WEIGHTS.crash * np.where(np.isfinite(collision), crash, 0.0)
     if late is not None:
         score -= late
-    score -= WEIGHTS.overrun * (_overrun(options, rolled, scene, limits, times, ego, settings) + is_hit)
+    score -= WEIGHTS.overrun * _overrun(options, rolled, scene, limits, times, ego, settings) + WEIGHTS.hit * is_hit
     held = waiting | refused
     may_go = any(option.profile.uses_oncoming and option.proposal.profile not in held for option in options)
     values: list[float] = score.tolist()
@@ -172,15 +174,15 @@ def _overrun(
         leads = np.array([option.leads[:, -1] for option in options]) & ahead
         overrun = np.where(leads, rolled.s[:, -1:] - stop, 0.0).max(axis=1, initial=0.0)
     for index, option in enumerate(options):
-        proposal = option.proposal
-        for wall in option.walls:
-            waits = rolled.s[index][times < wall.until]
-            if waits.size:
-                overrun[index] = max(overrun[index], waits[-1] - max(wall.s, nearest) - STOPPING_ERROR)
+        proposal, s, speed = option.proposal, rolled.s[index], rolled.speed[index]
         if proposal.is_emergency:
             overrun[index] = 0.0
-        elif proposal.deceleration < settings.hard_deceleration:
-            s, speed = rolled.s[index], rolled.speed[index]
+            continue
+        for wall in option.walls:
+            waits = s[times < wall.until]
+            if waits.size:
+                overrun[index] = max(overrun[index], waits[-1] - max(wall.s, nearest) - STOPPING_ERROR)
+        if proposal.deceleration < settings.hard_deceleration:
             is_fast = (speed > np.interp(s, limits.along, limits.values) + TOO_FAST)[later].any()
             if is_fast or _is_close(option, s, speed, scene, later, ego, settings):
                 overrun[index] = MOST_OVERRUN

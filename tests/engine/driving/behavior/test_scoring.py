@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -87,6 +88,24 @@ def test_stop_behind_its_place_costs_by_distance_unless_none_is_possible(
     scene = crossing_car(0.0, 0.0, yields=True).rows(np.empty(0, dtype=np.intp))
     free, stopped = evaluate(options, rolled, scene, TIMES, body, SETTINGS, limits=LIMITS, kept=kept).score
     assert free - stopped == pytest.approx(cost)
+
+
+@pytest.mark.parametrize(("gap", "cost"), [(25.6, 0.0), (25.4, 3.0)])
+def test_comfortable_braking_leaves_the_distance_of_a_hard_stop(gap: float, cost: float) -> None:
+    """From 10 m/s with 2 m/s² it has gap - 25 m + v² / 4 to a standing leader, and needs 0.5 v + v² / 8 for a stop with
+    4 m/s² after 0.5 s: that is just enough at 2 m/s for a gap of 25.5 m."""
+    speed = np.maximum(SPEED - 2.0 * TIMES, 0.0)
+    rolled = Rollout(np.tile((SPEED**2 - speed**2) / 4.0, (2, 1)), np.tile(speed, (2, 1)), np.full((2, 4), -1))
+    route, body = LateralProfile("route", (0.0,), (0.0,)), Body(1.4, 2.4, 0.9, 2.85)
+    ones = np.ones((1, len(TIMES)))
+    leader = msgspec.structs.replace(
+        crossing_car(body.front + gap + 1.0, 0.0, yields=True), d=0.0 * ones, crosses=ones < 0.0
+    )
+    proposals = (Proposal(0, 1.0, "all", deceleration) for deceleration in (4.0, 2.0))
+    options = [Option(proposal, route, [], ones > 0.0, SETTINGS.time_gap) for proposal in proposals]
+    kept = frozenset({"route"})
+    hard, comfortable = evaluate(options, rolled, leader, TIMES, body, SETTINGS, limits=LIMITS, kept=kept).score
+    assert hard - comfortable == pytest.approx(cost)
 
 
 @pytest.mark.parametrize(
