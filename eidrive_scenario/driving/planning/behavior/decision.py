@@ -37,6 +37,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     TOWARDS_GAP,
     WALKING_PACE,
     Body,
+    Conflict,
     LateralProfile,
     Option,
     Precedence,
@@ -149,6 +150,21 @@ class Decision(msgspec.Struct, frozen=True):
     objects: tuple[int, ...]
     is_free: bool = False
     """Whether only the wanted speed determines the next motion."""
+
+
+class Course(msgspec.Struct, frozen=True):
+    """Lateral profile of proposals, with what lies on it.
+
+    holds      walls at which each proposal stops, whatever its precedence
+    way        hypotheses in the way (N, K), before these walls
+    conflicts  objects that cross the way or enter it later
+    """
+
+    profile: LateralProfile
+    verdict: Verdict
+    holds: list[Wall]
+    way: Bools
+    conflicts: list[Conflict]
 
 
 class Decider:
@@ -346,69 +362,16 @@ class Decider:
             profiles = profiles + passing_profiles(situation, scene, has_begun=self._passes)
         waiting, refused = set[int](), set[int]()
         options: list[Option] = []
-        reasons = [f"give way to {situation.kind_of(owner)}" for owner in scene.owner]
-        here = (self._body.front, situation.s, situation.speed)
-        stops = situation.stops
         change = situation.change
         end = None if change is None else change.wall(self._body.front, self._settings.lateral_acceleration)
         for number, profile in enumerate(profiles):
-            holds: list[Wall] = []
-            verdict = Verdict.GO
-            if profile.uses_oncoming:
-                profile, verdict, waits_at = self._verified(situation, scene, profile)
-                if verdict in (Verdict.WAIT, Verdict.FOLLOW):
-                    waiting.add(number)
-                if verdict is Verdict.WAIT:
-                    holds.append(Wall(waits_at, math.inf, "wait for a free oncoming lane"))
-                if verdict is Verdict.GIVE_UP:
-                    refused.add(number)
             merges = change is not None and profile.name == change.name
-            if end is not None and not merges:
-                holds.append(end)
-            seeks_gap = change is not None and situation.s >= change.begin and not merges
-            way = inside_way(scene, profile, self._body.half_width)
-            if verdict is not Verdict.WAIT:
-                holds += situation.clear_of_junctions(scene, way)
-            if profile.gives_up:
-                # It falls behind what it is beside, and does not brake for it before.
-                behind = profile.places[1] + self._body.front
-                way &= (scene.speed <= ONCOMING_SPEED) | (scene.rear > behind)
-            for hold in holds:
-                way &= scene.rear < hold.s + self._body.front
-            crossing = conflicts(scene, way, situation.s)
-            if profile.gives_up:
-                crossing = [conflict for conflict in crossing if conflict.crosses]
-            is_passing = self._passes and profile.uses_oncoming and not profile.overtakes
-            # A gentle motion through another lane would take too long.
-            follows = number == 0 and profile.side == 0 and len(scene) > 0
-            reactions: dict[Precedence, tuple[list[Wall], Bools]] = {}
-            for proposal in proposals_for(
-                number,
-                crossing,
-                self._settings,
-                emergency=self._emergency,
-                gives_up=profile.gives_up,
-                is_current=number == 0,
-                comfortable=TOWARDS_GAP if seeks_gap else (1.0,) if follows else (),
-            ):
-                kind = proposal.precedence
-                if kind not in reactions:
-                    walls = [*holds, *crossing_walls(crossing, self._times, here, kind, reasons), *stops]
-                    reactions[kind] = walls, leading(scene, way, crossing, situation.center, kind)
-                time_gap = MERGING_TIME_GAP if merges else self._time_gap.value
-                if is_passing and not (reactions[kind][1] & (scene.speed > ONCOMING_SPEED)).any():
-                    time_gap = 0.0  # It leaves the oncoming lane soon, before what stands there.
-                if profile.gives_up:
-                    time_gap = 0.0  # It falls behind a vehicle that is faster than it is then.
-                if verdict is Verdict.FOLLOW:
-                    time_gap = max(self._settings.time_gap, VIEW_TIME_GAP)
-                options.append(Option(proposal, profile, *reactions[kind], time_gap))
-            if change is not None and seeks_gap:
-                walls, leads = reactions["all"]
-                comfortable = self._settings.comfortable_deceleration
-                leads = leads | gap_leader(scene, change.offset, situation.motion, self._body, comfortable)
-                gently = Proposal(number, 1.0, "all", comfortable)
-                options.append(Option(gently, profile, walls, leads, MERGING_TIME_GAP))
+            course = self._course(situation, scene, profile, None if merges else end)
+            if course.verdict in (Verdict.WAIT, Verdict.FOLLOW):
+                waiting.add(number)
+            if course.verdict is Verdict.GIVE_UP:
+                refused.add(number)
+            options += self._options_along(situation, scene, number, course, merges=merges)
         rolled = self._roll(situation, scene, options)
         late = None
         if change is not None and end is not None and situation.s >= change.begin:
@@ -430,6 +393,74 @@ class Decider:
             late=late,
         )
         return Options(options, rolled, evaluation, float(self._times[-1]), waiting, refused)
+
+    def _course(self, situation: Situation, scene: Surroundings, profile: LateralProfile, end: Wall | None) -> Course:
+        """Return the course along a profile; `end` is the end of the lane unless the profile leaves it."""
+        holds: list[Wall] = []
+        verdict = Verdict.GO
+        if profile.uses_oncoming:
+            profile, verdict, waits_at = self._verified(situation, scene, profile)
+            if verdict is Verdict.WAIT:
+                holds.append(Wall(waits_at, math.inf, "wait for a free oncoming lane"))
+        if end is not None:
+            holds.append(end)
+        way = inside_way(scene, profile, self._body.half_width)
+        if verdict is not Verdict.WAIT:
+            holds += situation.clear_of_junctions(scene, way)
+        if profile.gives_up:
+            # It falls behind what it is beside, and does not brake for it before.
+            behind = profile.places[1] + self._body.front
+            way &= (scene.speed <= ONCOMING_SPEED) | (scene.rear > behind)
+        for hold in holds:
+            way &= scene.rear < hold.s + self._body.front
+        crossing = conflicts(scene, way, situation.s)
+        if profile.gives_up:
+            crossing = [conflict for conflict in crossing if conflict.crosses]
+        return Course(profile, verdict, holds, way, crossing)
+
+    def _options_along(
+        self, situation: Situation, scene: Surroundings, number: int, course: Course, *, merges: bool
+    ) -> list[Option]:
+        """Return the proposals along the course of the profile `number`, of which 0 is the current one."""
+        profile, settings = course.profile, self._settings
+        change = situation.change
+        seeks_gap = change is not None and situation.s >= change.begin and not merges
+        is_passing = self._passes and profile.uses_oncoming and not profile.overtakes
+        # A gentle motion through another lane would take too long.
+        follows = number == 0 and profile.side == 0 and len(scene) > 0
+        here = (self._body.front, situation.s, situation.speed)
+        reasons = [f"give way to {situation.kind_of(owner)}" for owner in scene.owner]
+        reactions: dict[Precedence, tuple[list[Wall], Bools]] = {}
+        options: list[Option] = []
+        for proposal in proposals_for(
+            number,
+            course.conflicts,
+            settings,
+            emergency=self._emergency,
+            gives_up=profile.gives_up,
+            is_current=number == 0,
+            comfortable=TOWARDS_GAP if seeks_gap else (1.0,) if follows else (),
+        ):
+            kind = proposal.precedence
+            if kind not in reactions:
+                yields = crossing_walls(course.conflicts, self._times, here, kind, reasons)
+                leads = leading(scene, course.way, course.conflicts, situation.center, kind)
+                reactions[kind] = [*course.holds, *yields, *situation.stops], leads
+            walls, leads = reactions[kind]
+            time_gap = MERGING_TIME_GAP if merges else self._time_gap.value
+            if is_passing and not (leads & (scene.speed > ONCOMING_SPEED)).any():
+                time_gap = 0.0  # It leaves the oncoming lane soon, before what stands there.
+            if profile.gives_up:
+                time_gap = 0.0  # It falls behind a vehicle that is faster than it is then.
+            if course.verdict is Verdict.FOLLOW:
+                time_gap = max(settings.time_gap, VIEW_TIME_GAP)
+            options.append(Option(proposal, profile, walls, leads, time_gap))
+        if change is not None and seeks_gap:
+            walls, leads = reactions["all"]
+            comfortable = settings.comfortable_deceleration
+            leads = leads | gap_leader(scene, change.offset, situation.motion, self._body, comfortable)
+            options.append(Option(Proposal(number, 1.0, "all", comfortable), profile, walls, leads, MERGING_TIME_GAP))
+        return options
 
     def _motion(self, situation: Situation, scene: Surroundings, profile: LateralProfile, time_gap: float) -> Motion:
         """Return the motion along a profile at the wanted speed, with a time gap behind leaders [s]."""
