@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
+from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, ValidationError
@@ -99,7 +100,8 @@ def split_planner_settings(
             )
     planner_line = lines.get("planner_settings", lines.get("planner", line))
     nested_origins = {path.removeprefix("planner_settings."): text for path, text in origins.items()}
-    settings = _parse(model, {**own, **nested}, source, planner_line, lines, nested_origins, diagnostics)
+    paths = {str(key): f"planner_settings.{key}" for key in nested}
+    settings = _parse(model, {**own, **nested}, source, planner_line, lines, nested_origins, diagnostics, paths)
     return rest, settings or PlannerSettings()
 
 
@@ -111,6 +113,7 @@ def _parse(
     lines: Mapping[str, int],
     origins: Mapping[str, str],
     diagnostics: list[Diagnostic],
+    paths: Mapping[str, str] = MappingProxyType({}),
     *,
     incomplete: bool = False,
 ) -> PlannerSettings | None:
@@ -119,7 +122,7 @@ def _parse(
     A missing setting is no error if the settings are incomplete, or if its property is invalid.
     """
     try:
-        return parse_settings(model, given, source=source, line=line, lines=lines, origins=origins)
+        return parse_settings(model, given, source=source, line=line, lines=lines, origins=origins, paths=paths)
     except SettingError as error:
         cause = error.__cause__
         if not isinstance(cause, ValidationError):

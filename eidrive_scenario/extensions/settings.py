@@ -37,11 +37,13 @@ def parse_settings(
     line: int | None = None,
     lines: Mapping[str, int] | None = None,
     origins: Mapping[str, str] = MappingProxyType({}),
+    paths: Mapping[str, str] = MappingProxyType({}),
 ) -> S:
     """Return `data` as an instance of `model`.
 
     lines    lines of single keys, with the paths of `key_lines`; `line` applies to all others
     origins  origins of values from elsewhere, such as a parameter, by these paths; an error of the value names it
+    paths    paths of keys for errors, if the user wrote them into another mapping; other keys are their own paths
 
     Raise SettingError with one diagnostic per invalid key.
     """
@@ -51,7 +53,7 @@ def parse_settings(
         details = _without_consequences(error.errors(include_url=False))[:MAX_DIAGNOSTICS]
         diagnostics = [
             _with_origins(
-                _diagnostic(model, data, detail, source, line, lines or {}), _value_path(detail, data), origins
+                _diagnostic(model, data, detail, source, line, lines or {}, paths), _value_path(detail, data), origins
             )
             for detail in details
         ]
@@ -60,7 +62,7 @@ def parse_settings(
         given = _given(loc, data)
         is_immense = not abs(number) <= MAX_NUMBER and not (isinstance(number, float) and math.isinf(number))
         if is_immense or isinstance(given, bool):
-            message = f"setting {quoted(_typed_path(loc, data))} is {quoted(number if is_immense else given)}"
+            message = f"setting {quoted(_typed_path(loc, data, paths))} is {quoted(number if is_immense else given)}"
             hint = f"give a number within {MAX_NUMBER:g}" if is_immense else "give a number"
             diagnostic = Diagnostic(message, hint, source, _line_of(loc, lines or {}, line))
             raise SettingError(_with_origins(diagnostic, ".".join(_keys_of(loc, data)), origins))
@@ -92,10 +94,11 @@ def _diagnostic(
     source: str,
     line: int | None,
     lines: Mapping[str, int],
+    paths: Mapping[str, str],
 ) -> Diagnostic:
     """Return the diagnostic of a pydantic error, with the keys of the user and the line of the innermost known one."""
     kind, loc = detail["type"], detail["loc"]
-    path = _typed_path(loc, data)
+    path = _typed_path(loc, data, paths)
     key_line = _line_of(loc, lines, line)
     if kind == "extra_forbidden":
         known_hint = detail.get("ctx", {}).get("hint")
@@ -182,7 +185,7 @@ _COLLECTIONS = {
 """Hints by the type of the error of a value that is no mapping or no list."""
 
 
-def _typed_path(loc: tuple[int | str, ...], data: Any) -> str:
+def _typed_path(loc: tuple[int | str, ...], data: Any, paths: Mapping[str, str]) -> str:
     """Return the key path of `loc` with the kinds of tagged unions, such as `delay.constant.seconds`.
 
     Parts that only pydantic adds are omitted: the types of a union, and a kind that equals the key before it.
@@ -193,7 +196,7 @@ def _typed_path(loc: tuple[int | str, ...], data: Any) -> str:
             part in data if isinstance(data, Mapping) else isinstance(data, (list, tuple)) and isinstance(part, int)
         )
         if is_key or (isinstance(data, Mapping) and str(part) not in keys[-1:]):
-            keys.append(str(part))
+            keys.append(str(part) if keys else paths.get(str(part), str(part)))
         if is_key and (isinstance(data, Mapping) or int(part) < len(data)):
             data = data[part]
     return ".".join(keys)
@@ -284,7 +287,8 @@ def parse_own_settings(
     """
     if getattr(extension, "settings_type", None) is not None:
         model = settings_type_of(kind, name, extension, Settings)
-        return parse_settings(model, given, source=source, line=line)
+        paths = {key: f"{setting}.{key}" for key in (*map(str, given), *model.model_fields)}
+        return parse_settings(model, given, source=source, line=line, paths=paths)
     if given:
         message = f"{singular(kind)} {name!r} has no settings"
         raise SettingError(Diagnostic(message, f"remove the property {setting!r}", source, line))

@@ -171,7 +171,7 @@ class Perception:
         if _has_all(readings, self.detector.needs):
             detections = self.detector.detect(readings)
             if self._checked:
-                check_detections(self.detector, "detect", detections)
+                check_detections(self.detector, "detect", detections, now=now)
             if len(readings.attached):
                 detections = without_rows(detections, rows_on_bodies(detections, outlines(readings.attached)))
             if self._false_objects:
@@ -188,7 +188,7 @@ class Perception:
         if newest is None and self._tracker is not None:
             newest = self._tracker.predict(now - self._latency)
             if newest is not None:
-                check_detections(self._tracker, "predict", newest)
+                check_detections(self._tracker, "predict", newest, now=now)
         return newest
 
     def _track(self, detections: Detections, readings: Readings) -> Detections:
@@ -203,7 +203,7 @@ class Perception:
             return shares
 
         tracked = self._tracker.update(detections, in_view)
-        check_detections(self._tracker, "update", tracked)
+        check_detections(self._tracker, "update", tracked, now=readings.time)
         return tracked
 
 

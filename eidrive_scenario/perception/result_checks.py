@@ -8,6 +8,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import CLASSES, Detections
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.errors import InvalidResult
 
 LARGEST = 1e9
@@ -31,8 +32,10 @@ def is_checked(extension: object) -> bool:
     return not vars(type(extension)).get("is_finite_by_construction", False)
 
 
-def check_detections(extension: object, method: str, detections: object) -> None:
+def check_detections(extension: object, method: str, detections: object, *, now: float | None = None) -> None:
     """Raise InvalidResult unless `detections` is a Detections of finite numbers in their ranges.
+
+    now  time after which nothing can have been measured [s]; None: fused reports, whose clocks may be fast
 
     Sizes are in [0, LARGEST_SIZE], scores and existence in [0, 1], variances at least 0, and no coordinate or speed
     exceeds LARGEST. Velocity and covariance may be NaN.
@@ -41,6 +44,9 @@ def check_detections(extension: object, method: str, detections: object) -> None
         raise InvalidResult(extension, method, f"returned {describe(detections)} (expected Detections)")
     _check_rows(extension, method, detections)
     try:
+        if now is not None and detections.time > now + TIME_TOLERANCE:
+            text = f"returned the time {detections.time:g} s, which is later than that of the readings, {now:g} s"
+            raise InvalidResult(extension, method, text)
         if math.isfinite(detections.time) and (not len(detections.boxes) or _is_in_range(detections)):
             return
     except (TypeError, ValueError, AttributeError):

@@ -154,6 +154,7 @@ def test_trailer_cannot_be_driven(tmp_path: Path) -> None:
         ("module: other\n", "s.yaml:1: property 'module' is 'other'; remove it, or write eidrive"),
         ("target_speed: $Speed\n", "s.yaml:1: setting 'target_speed': unknown parameter $Speed; known: End, OtherY"),
         ("x: !!python/object:os.system {}\n", "s.yaml:1: not valid YAML: tags are not supported"),
+        ("range: 5\nfusion_settings: {gaet: 1}\n", "s.yaml:2: unknown setting 'fusion_settings.gaet'; did you mean"),
         ("detector: yolov5\ndetector_settings: {weights: own.npz}\n", "s.yaml:2: no file 'own.npz' with weights"),
     ],
 )

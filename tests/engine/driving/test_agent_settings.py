@@ -128,7 +128,7 @@ WRONG = [
     ([("range", "far")], "s.xosc:12: setting 'range' is 'far'"),
     ([("target_speed", "-3")], "s.xosc:12: setting 'target_speed' is -3"),
     ([("planner", "conflict_area")], "s.xosc:12: setting 'conflict_area' is missing"),
-    ([("planner", "route"), ("planner_settings", "{gap: 1}")], "s.xosc:13: unknown setting 'gap'"),
+    ([("planner", "route"), ("planner_settings", "{gap: 1}")], "s.xosc:13: unknown setting 'planner_settings.gap'"),
     ([("planner_settings", "[1]")], "s.xosc:12: setting 'planner_settings' is [1]; a mapping is expected"),
     ([("vehicle_controller", "pdi")], "s.xosc:12: unknown vehicle controller 'pdi'; did you mean 'pid'?"),
     ([("tracker", "cvt")], "s.xosc:12: setting 'tracker' is 'cvt'; did you mean 'cv"),

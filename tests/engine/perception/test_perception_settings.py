@@ -117,9 +117,9 @@ def test_invalid_detector_settings_are_errors_with_line(write: Write) -> None:
     diagnostics = diagnostics_of(path)
     line = line_of(path, "detector_settings")
     assert all(
-        diagnostic.startswith(f"{path}:{line}: ") for diagnostic in diagnostics if "detector_settings" not in diagnostic
+        diagnostic.startswith(f"{path}:{line}: ") for diagnostic in diagnostics if "has no settings" not in diagnostic
     )
-    assert any("'min_points' is 0" in diagnostic for diagnostic in diagnostics)
+    assert any("'detector_settings.min_points' is 0" in diagnostic for diagnostic in diagnostics)
     assert any("did you mean 'off_road'?" in diagnostic for diagnostic in diagnostics)
 
 

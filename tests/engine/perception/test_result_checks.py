@@ -92,6 +92,12 @@ def test_check_detections_refuses_invalid_results(make: Callable[[], Any], diagn
     assert str(caught.value).startswith(f"detect {diagnostic}")
 
 
+def test_check_detections_refuses_time_after_the_readings() -> None:
+    check_detections(Named(), "detect", detections(time=0.3), now=0.3 - 5e-10)
+    with pytest.raises(InvalidResult, match=r"detect returned the time 5\.3 s, which is later .* readings, 0\.3 s"):
+        check_detections(Named(), "detect", detections(time=5.3), now=0.3)
+
+
 def test_is_checked_for_derived_classes_of_third_parties() -> None:
     class Derived(OracleDetector):
         pass
