@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import chain
 
 import msgspec
 
@@ -32,6 +33,8 @@ FATAL_CRITERION = "criterion: "
 """Prefixes of the reasons for an end by an exit command, and by a fatal criterion; its name follows."""
 EXPIRED_SHARE = 0.1
 """Share of the received messages of a link that may be too old for their receiver without a warning."""
+MOST_SIMULTANEOUS = 10
+"""Number of messages of a link that may all be lost because the receiver was transmitting, without a warning."""
 UNJUDGED = "the run is not judged: it has no criterion"
 """Start of the warning of a run without verdicts."""
 HOW_TO_JUDGE = (
@@ -99,6 +102,7 @@ def build_result(
     verdicts = observer.verdicts(state.exit)
     exit_code = exit_code_of(verdicts, end.reason, no_criteria=no_criteria)
     unjudged = [] if verdicts else [UNJUDGED if no_criteria else f"{UNJUDGED}; {HOW_TO_JUDGE}"]
+    of_links = chain(expired_messages(links), simultaneous_messages(links))
     metrics = criteria_metrics(state.criteria)
     metrics.update(stack.metrics(frame.view.time))
     metrics.update(measures.false_tracks.metrics())
@@ -115,7 +119,7 @@ def build_result(
         trace_hash=measures.trace.hexdigest(),
         simulated_s=frame.view.time,
         wall_s=end.wall_s,
-        warnings=tuple(dict.fromkeys([*unjudged, *state.warnings, *late_warnings, *map(str, expired_messages(links))])),
+        warnings=tuple(dict.fromkeys([*unjudged, *state.warnings, *late_warnings, *map(str, of_links)])),
         parameters=dict(scenario.parameters),
         run=settings.run,
         links=links,
@@ -180,6 +184,22 @@ def expired_messages(links: Mapping[tuple[str, str], LinkStatistics]) -> Iterato
             f"station {receiver!r} does not use {link.expired} of {link.received} received messages of {sender!r}"
             f"{more}: they are too old on arrival (mean delay {link.mean_delay or 0.0:.3g} s)",
             "limits are its property report_timeout, and max_age or max_lateness of its fusion method",
+        )
+
+
+def simultaneous_messages(links: Mapping[tuple[str, str], LinkStatistics]) -> Iterator[Diagnostic]:
+    """Yield a warning for each receiver of a link that loses all messages because both stations transmit at once."""
+    senders: dict[str, list[str]] = {}
+    for (sender, receiver), link in links.items():
+        if link.sent > MOST_SIMULTANEOUS and link.lost_by.get("half_duplex") == link.sent - link.in_flight:
+            senders.setdefault(receiver, []).append(sender)
+    for receiver, (sender, *others) in sorted(senders.items()):
+        lost = links[sender, receiver].lost
+        more = f", and those of {len(others)} more station{'s' * (len(others) > 1)}" if others else ""
+        yield Diagnostic(
+            f"station {receiver!r} receives none of {lost} messages of {sender!r}{more}: it always transmits at the "
+            "same time (half_duplex)",
+            "set a jitter of the channel above 0, or different properties message_phase",
         )
 
 

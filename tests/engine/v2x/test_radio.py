@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from radio_traffic import DT, QUIET, Place, exchange, message, radio
 
+from eidrive_scenario.simulation import RunSettings, run_file
 from eidrive_scenario.v2x.link_models.composed import ComposedChannel, ComposedProfile
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
@@ -213,3 +214,13 @@ def test_radio_channel_each_message_has_one_outcome_per_receiver(technology: str
     assert len(deliveries) == len(set(deliveries)) > 0
     assert set(deliveries) <= delivered
     assert {event.reason for event in events} >= {"", "absent", "half_duplex", "collision"}
+
+
+@pytest.mark.parametrize(("jitter", "warned"), [(0, True), (0.01, False)])
+def test_stations_that_always_transmit_at_once_are_a_warning(jitter: float, warned: bool) -> None:
+    """With an idle channel each station transmits 110 µs (AIFS) after the message (IEEE 802.11): all at one instant."""
+    channel = f"{{model: radio, jitter: {jitter}}}"
+    result = run_file("coop/scenario_1", settings=RunSettings(channel=channel, time_limit=1.0))
+    simultaneous = [text for text in result.warnings if "half_duplex" in text]
+    assert [text.startswith("station 'Ego' receives none of") for text in simultaneous] == [True] * warned
+    assert (result.links["RSU", "Ego"].received == 0) == warned
