@@ -40,8 +40,8 @@ class CurveTable:
         self._evaluations = [(kind, evaluate) for kind, evaluate in kinds if (self._kind == kind).any()]
         """Kinds of curves on these lines that are neither lines nor arcs, and their evaluation."""
         self._cubic = np.array(
-            [(*curve.u, *curve.v, curve.pace) if isinstance(curve, Cubic) else (0.0,) * 9 for curve in curves]
-        ).reshape(-1, 9)
+            [(*curve.u, *curve.v) if isinstance(curve, Cubic) else (0.0,) * 8 for curve in curves]
+        ).reshape(-1, 8)
 
     def at(self, line: Integers, s: Array) -> tuple[Array, Array, Array, Array, Array]:
         """Return x, y, heading, curvature and path length per meter of s at s (N,) of lines (N,)."""
@@ -106,15 +106,14 @@ class CurveTable:
         u, v = cos * along - sin * across, sin * along + cos * across
         return u, v, ds * (k + 0.5 * rate * ds), k + rate * ds, np.ones(len(ds))
 
-    def _cubics(self, curve: Integers, ds: Array) -> tuple[Array, Array, Array, Array, Array]:
-        u0, u1, u2, u3, v0, v1, v2, v3, pace = self._cubic[curve].T
-        p = ds * pace
+    def _cubics(self, curve: Integers, p: Array) -> tuple[Array, Array, Array, Array, Array]:
+        u0, u1, u2, u3, v0, v1, v2, v3 = self._cubic[curve].T
         du, dv = u1 + p * (2.0 * u2 + 3.0 * p * u3), v1 + p * (2.0 * v2 + 3.0 * p * v3)
         ddu, ddv = 2.0 * u2 + 6.0 * p * u3, 2.0 * v2 + 6.0 * p * v3
         norm = np.hypot(du, dv)
         bend = np.divide(du * ddv - dv * ddu, norm**3, out=np.zeros_like(norm), where=norm > STANDSTILL)
         u, v = u0 + p * (u1 + p * (u2 + p * u3)), v0 + p * (v1 + p * (v2 + p * v3))
-        return u, v, np.arctan2(dv, du), bend, norm * pace
+        return u, v, np.arctan2(dv, du), bend, norm
 
 
 def _spiral_columns(curvature: Array, rate: Array) -> Array:

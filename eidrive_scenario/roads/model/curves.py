@@ -1,7 +1,7 @@
 """Plan view of a road: consecutive lines, arcs, spirals (clothoids) and cubic curves.
 
-A poly3 is converted into short cubic curves over arc length on reading. Three kinds remain: curves of constant
-curvature (closed form), spirals (Fresnel integrals) and parametric cubics.
+A poly3 and a normalized paramPoly3 are converted into short cubic curves over arc length on reading. Three kinds
+remain: curves of constant curvature (closed form), spirals (Fresnel integrals) and parametric cubics.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import math
 from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -77,8 +77,10 @@ lose precision.
 
 STANDSTILL = 1e-9
 """Maximum path length per unit of the parameter of a cubic at which it has no direction, and no curvature."""
+MIN_CUBICS = 16
+"""Minimum number of cubics that replace one curve, so that a short curve with a large bend keeps its shape."""
 MAX_CUBICS = 20_000
-"""Maximum number of cubics that replace one poly3. Cubics of a longer poly3 are longer than a meter."""
+"""Maximum number of cubics that replace one curve. Cubics of a longer curve are longer than a meter."""
 
 
 Coefficients = tuple[float, float, float, float]
@@ -182,18 +184,16 @@ class Spiral(Curve):
 
 @dataclass(frozen=True)
 class Cubic(Curve):
-    """Curve u(p), v(p), cubic in the local frame of the start, with p = ds·pace."""
+    """Curve u(p), v(p), cubic in the local frame of the start, with p = ds."""
 
     u: Coefficients = (0.0, 1.0, 0.0, 0.0)
     v: Coefficients = (0.0, 0.0, 0.0, 0.0)
-    pace: float = 1.0
 
     def bend(self, ds: float) -> tuple[float, float]:
-        _, _, curvature, speed = self._derivatives(ds * self.pace)
+        _, _, curvature, speed = self._derivatives(ds)
         return curvature, speed
 
-    def at(self, ds: float) -> CurvePoint:
-        p = ds * self.pace
+    def at(self, p: float) -> CurvePoint:
         u0, u1, u2, u3 = self.u
         v0, v1, v2, v3 = self.v
         u, v = u0 + p * (u1 + p * (u2 + p * u3)), v0 + p * (v1 + p * (v2 + p * v3))
@@ -209,7 +209,7 @@ class Cubic(Curve):
         ddu, ddv = 2.0 * u2 + 6.0 * p * u3, 2.0 * v2 + 6.0 * p * v3
         norm = math.hypot(du, dv)
         curvature = (du * ddv - dv * ddu) / norm**3 if norm > STANDSTILL else 0.0
-        return du, dv, curvature, norm * self.pace
+        return du, dv, curvature, norm
 
 
 def spiral(
@@ -225,39 +225,59 @@ def spiral(
 def poly3(
     s: float, x: float, y: float, h: float, length: float, v: Coefficients, line: int | None = None
 ) -> list[Cubic]:
-    """Return the curve v(u) = a + b·u + c·u² + d·u³ as cubics over arc length.
+    """Return the curve v(u) = a + b·u + c·u² + d·u³ from u = 0 over its arc length, as cubics over arc length."""
+    return _over_arc_length(Cubic(s, x, y, h, length, v=v, line=line), length, length)
+
+
+def param_poly3(
+    s: float, x: float, y: float, h: float, length: float, u: Coefficients, v: Coefficients, line: int | None = None
+) -> list[Cubic]:
+    """Return the curve u(p), v(p) for p from 0 to 1 as cubics over arc length, which is scaled to `length` [m]."""
+    return _over_arc_length(Cubic(s, x, y, h, length, u, v, line=line), 1.0)
+
+
+def _over_arc_length(curve: Cubic, end: float, arc_length: float | None = None) -> list[Cubic]:
+    """Return a curve u(p), v(p) as cubics over s, which is proportional to the arc length.
 
     The arc length is integrated by Gauss-Legendre quadrature. Each cubic has the points and tangents of the curve at
     both ends (Hermite), so that the error decreases with the fourth power of its length and is far below a millimeter.
-    """
-    a, b, c, d = v
 
-    def slope(u: Array) -> Array:
-        return np.asarray(b + u * (2.0 * c + 3.0 * d * u))
+    end         maximum of the parameter p
+    arc_length  length of the curve [m]; without it the curve extends to `end`
+    """
+    u, v = (np.polynomial.Polynomial(coefficients) for coefficients in (curve.u, curve.v))
+    du, dv = u.deriv(), v.deriv()
+
+    def speed(p: Array) -> Array:
+        return np.asarray(np.hypot(du(p), dv(p)))
 
     nodes, weights = np.polynomial.legendre.leggauss(5)
-    count = min(max(math.ceil(length), 4), MAX_CUBICS)
-    edges = np.linspace(0.0, length, count * 4 + 1)
+    count = min(max(math.ceil(curve.length), MIN_CUBICS), MAX_CUBICS)
+    edges = np.linspace(0.0, end, count * 4 + 1)
     half = 0.5 * np.diff(edges)
     middle = 0.5 * (edges[1:] + edges[:-1])
-    speed = np.sqrt(1.0 + slope(middle[:, None] + half[:, None] * nodes) ** 2)
-    arc = np.concatenate([[0.0], np.cumsum(half * (speed @ weights))])
-    knots = np.linspace(0.0, length, count + 1)
-    u = np.interp(knots, arc, edges)
+    arc = np.concatenate([[0.0], np.cumsum(half * (speed(middle[:, None] + half[:, None] * nodes) @ weights))])
+    knots = np.linspace(0.0, float(arc[-1]) if arc_length is None else arc_length, count + 1)
+    cell = np.clip(np.searchsorted(arc, knots, side="right") - 1, 0, len(half) - 1)
+    p = np.interp(knots, arc, edges)
     for _ in range(3):
-        cell = np.clip(np.searchsorted(edges, u, side="right") - 1, 0, len(half) - 1)
-        reach = 0.5 * (u - edges[cell])
-        inner = np.sqrt(1.0 + slope(edges[cell, None] + reach[:, None] * (nodes + 1.0)) ** 2)
-        u = u - (arc[cell] + reach * (inner @ weights) - knots) / np.sqrt(1.0 + slope(u) ** 2)
-    rise = slope(u)
-    du = 1.0 / np.sqrt(1.0 + rise**2)
-    step = length / count
-    ends_u, ends_v = (u, du), (a + u * (b + u * (c + u * d)), rise * du)
-    cubics = []
-    for i in range(count):
-        along, across = _hermite(*ends_u, i, step), _hermite(*ends_v, i, step)
-        cubics.append(Cubic(s + float(knots[i]), x, y, h, step, along, across, line=line))
-    return cubics
+        reach = 0.5 * (p - edges[cell])
+        inner = speed(edges[cell, None] + reach[:, None] * (nodes + 1.0)) @ weights
+        p = p - (arc[cell] + reach * inner - knots) / np.maximum(speed(p), STANDSTILL)
+        p = np.clip(p, edges[cell], edges[cell + 1])
+    step = curve.length / count
+    rate = knots[-1] / curve.length / np.maximum(speed(p), STANDSTILL)
+    ends_u, ends_v = (u(p), du(p) * rate), (v(p), dv(p) * rate)
+    return [
+        replace(
+            curve,
+            s=curve.s + i * step,
+            length=step,
+            u=_hermite(*ends_u, i, step),
+            v=_hermite(*ends_v, i, step),
+        )
+        for i in range(count)
+    ]
 
 
 def _hermite(value: Array, slope: Array, i: int, step: float) -> Coefficients:

@@ -19,7 +19,8 @@ KINDS = ("line", "arc", "spiral", "poly3", "paramPoly3")
 LONGEST = 1e6
 """Maximum length of a road or geometry [m]."""
 LONGEST_POLY3 = 2e5
-"""Maximum length of all poly3 of a file [m], as each meter takes memory."""
+"""Maximum length of all poly3 and normalized paramPoly3 of a file [m], as each meter takes memory."""
+POLYNOMIAL_METERS = "meters of poly3 and normalized paramPoly3"
 SHORTEST = 1e-9
 """Maximum length of a geometry that is omitted [m]. Geometries of length 0 occur in real maps."""
 
@@ -35,7 +36,7 @@ def read_reference_line(road: etree._Element, length: float, collector: Attribut
         return ReferenceLine([Arc(0.0, 0.0, 0.0, 0.0, length)], length)
     curves: list[Curve] = []
     for geometry in plan.iterfind("geometry"):
-        curves.extend(_read_geometry(geometry, collector))
+        curves.extend(_read_geometry(geometry, road.get("id", ""), collector))
     if not curves:
         collector.report_error(plan, f"road {road.get('id')!r} has no <geometry>", "add at least one")
         return ReferenceLine([Arc(0.0, 0.0, 0.0, 0.0, length)], length)
@@ -54,7 +55,7 @@ def read_reference_line(road: etree._Element, length: float, collector: Attribut
     return ReferenceLine(curves, length)
 
 
-def _read_geometry(geometry: etree._Element, collector: AttributeReader) -> Sequence[Curve]:
+def _read_geometry(geometry: etree._Element, road_id: str, collector: AttributeReader) -> Sequence[Curve]:
     s, x, y, h, length = (collector.number(geometry, name) for name in ("s", "x", "y", "hdg", "length"))
     if length <= SHORTEST:
         if length < 0.0:
@@ -77,20 +78,44 @@ def _read_geometry(geometry: etree._Element, collector: AttributeReader) -> Sequ
         case "spiral":
             ends = collector.number(shape, "curvStart"), collector.number(shape, "curvEnd")
             return [curves.spiral(*start, *ends, line=line)]
-        case "poly3":
-            a, b, c, d = (collector.number(shape, name) for name in "abcd")
-            collector.spend(geometry, "meters of poly3", length, LONGEST_POLY3)
-            return curves.poly3(*start, (a, b, c, d), line)
-        case "paramPoly3":
-            return [Cubic(*start, *_read_param_poly3(shape, length, collector), line=line)]
+        case "poly3" | "paramPoly3":
+            return _read_cubic(geometry, shape, start, road_id, collector)
     collector.report_error(shape, f"unknown geometry <{shape.tag}>", suggestion(str(shape.tag), KINDS))
     return []
 
 
-def _read_param_poly3(
-    shape: etree._Element, length: float, collector: AttributeReader
-) -> tuple[Coefficients, Coefficients, float]:
-    """Return the polynomials of u and v, and the change of their parameter per meter."""
+def _read_cubic(
+    geometry: etree._Element,
+    shape: etree._Element,
+    start: tuple[float, float, float, float, float],
+    road_id: str,
+    collector: AttributeReader,
+) -> Sequence[Curve]:
+    """Return a <poly3> or <paramPoly3>. A curve that leads too far away is reported and not converted."""
+    s, x, y, h, length = start
+    line = line_of(geometry)
+    if shape.tag == "poly3":
+        a, b, c, d = (collector.number(shape, name) for name in "abcd")
+        u, v, span = (0.0, 1.0, 0.0, 0.0), (a, b, c, d), "u"
+    else:
+        u, v, span = _read_param_poly3(shape, collector)
+    cubic = Cubic(s, x, y, h, length, u, v, line=line)
+    end = 1.0 if span == "normalized" else length
+    away = max(math.hypot(point.x - x, point.y - y) for point in (cubic.at(share * end) for share in _SHARES))
+    if not away <= MAX_SHAPE:
+        message = f"a geometry of road {road_id!r} leads {away:g} m away from its start"
+        collector.report_error(geometry, message, f"at most {MAX_SHAPE:g} m are read")
+        return [cubic]
+    if span == "arcLength":
+        return [cubic]
+    collector.spend(geometry, POLYNOMIAL_METERS, length, LONGEST_POLY3)
+    if span == "normalized":
+        return curves.param_poly3(s, x, y, h, length, u, v, line)
+    return curves.poly3(s, x, y, h, length, v, line)
+
+
+def _read_param_poly3(shape: etree._Element, collector: AttributeReader) -> tuple[Coefficients, Coefficients, str]:
+    """Return the polynomials of u and v, and the range of their parameter."""
     u0, u1, u2, u3 = (collector.number(shape, name) for name in ("aU", "bU", "cU", "dU"))
     v0, v1, v2, v3 = (collector.number(shape, name) for name in ("aV", "bV", "cV", "dV"))
     span = shape.get("pRange", "normalized")
@@ -99,7 +124,7 @@ def _read_param_poly3(
         collector.report_error(shape, f"<paramPoly3> has pRange={span!r}", hint)
     if not any((u1, u2, u3, v1, v2, v3)):
         collector.report_error(shape, "<paramPoly3> is a single point", "give polynomials for u and v")
-    return (u0, u1, u2, u3), (v0, v1, v2, v3), 1.0 if span == "arcLength" else 1.0 / length
+    return (u0, u1, u2, u3), (v0, v1, v2, v3), span
 
 
 MAX_SHAPE = 1e6
@@ -117,29 +142,11 @@ def check_extent(roads: Mapping[str, Road], collector: AttributeReader) -> None:
     """Report roads of excessive extent."""
     lanes = 0.0
     for road in roads.values():
-        _check_geometries(road, collector)
         lanes += sum(section.length * len(section.lanes) for section in road.sections)
         _check_cross_section(road, collector)
     if lanes > MAX_LANE_LENGTH:
         message = f"the lanes are {lanes:g} m long in total"
         collector.report_error(1, message, f"at most {MAX_LANE_LENGTH:g} m are read")
-
-
-def _check_geometries(road: Road, collector: AttributeReader) -> None:
-    """Report cubics that lead too far away from their start. Only cubics can exceed their length."""
-    farthest: dict[int | None, float] = {}
-    for curve in road.reference.curves:
-        if not isinstance(curve, Cubic):
-            continue
-        points = [curve.at(share * curve.length) for share in _SHARES]
-        away = max(math.hypot(point.x - curve.x, point.y - curve.y) for point in points)
-        if not away <= MAX_SHAPE:
-            # One geometry of a file may consist of several curves here.
-            line = curve.line or road.line
-            farthest[line] = max(away, farthest.get(line, 0.0))
-    for line, away in farthest.items():
-        message = f"a geometry of road {road.id!r} leads {away:g} m away from its start"
-        collector.report_error(line, message, f"at most {MAX_SHAPE:g} m are read")
 
 
 def _check_cross_section(road: Road, collector: AttributeReader) -> None:

@@ -33,7 +33,7 @@ def plan_views(draw: st.DrawFn) -> ReferenceLine:
         elif kind == "spiral":
             found.append(curves.spiral(s, x, y, h, length, curvature, bend))
         else:
-            found.append(Cubic(s, x, y, h, length, (0, length, 0, 0), (0, 0, 0.1 * length * bend, 0), 1 / length))
+            found.append(Cubic(s, x, y, h, length, (0, 1, 0, 0), (0, 0, 0.1 * bend / length, 0)))
         x, y, h, curvature, _ = found[-1].at(length)
         s += length
     return ReferenceLine(found, s)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.optimize import brentq
 from scipy.special import fresnel
 
 from eidrive_scenario.roads.model import curves
@@ -52,19 +53,33 @@ def test_spiral_with_negligible_rate_becomes_an_arc() -> None:
     assert isinstance(curves.spiral(0.0, 0.0, 0.0, 0.0, 60.0, 0.05, 0.05 + 1e-8), Spiral)
 
 
-def test_param_poly3_over_arc_length_equals_normalized() -> None:
+def test_param_poly3_over_arc_length_has_s_as_parameter() -> None:
     over_length = Cubic(0.0, 1.0, 2.0, 0.3, 20.0, (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.01, -0.0002))
-    normalized = Cubic(
-        0.0, 1.0, 2.0, 0.3, 20.0, (0.0, 20.0, 0.0, 0.0), (0.0, 0.0, 0.01 * 400, -0.0002 * 8000), pace=1 / 20
-    )
-    for ds in (0.0, 7.0, 20.0):
-        assert over_length.at(ds) == pytest.approx(normalized.at(ds))
     u, v = 10.0, 0.01 * 100 - 0.0002 * 1000
     cos, sin = math.cos(0.3), math.sin(0.3)
     slope = 0.02 * 10 - 0.0006 * 100
     expected = (1 + cos * u - sin * v, 2 + sin * u + cos * v, 0.3 + math.atan(slope))
     assert over_length.at(10.0)[:3] == pytest.approx(expected)
     assert over_length.at(10.0).curvature == pytest.approx((0.02 - 0.0012 * 10) / (1 + slope**2) ** 1.5)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.15, 0.5, 0.9, 1.0])
+def test_normalized_param_poly3_is_parametrized_by_arc_length(share: float) -> None:
+    """A left turn whose points move faster at its ends, like the turns that map editors export."""
+    of_u, of_v = (0.0, 24.0, -9.0, -3.0), (0.0, 0.0, 9.0, 3.0)
+    u, v = np.polynomial.Polynomial(of_u), np.polynomial.Polynomial(of_v)
+    du, dv = u.deriv(), v.deriv()
+
+    def arc_length(p: float) -> float:
+        return float(quad(lambda value: math.hypot(du(value), dv(value)), 0.0, p)[0])
+
+    length = arc_length(1.0)
+    line = ReferenceLine(curves.param_poly3(0.0, 1.0, 2.0, 0.0, length, of_u, of_v), length)
+    p = brentq(lambda value: arc_length(value) - share * length, 0.0, 1.0)
+    x, y, h, curvature, speed = line.at(share * length)
+    bend = (du(p) * dv.deriv()(p) - dv(p) * du.deriv()(p)) / math.hypot(du(p), dv(p)) ** 3
+    assert (x, y, h) == pytest.approx((1.0 + u(p), 2.0 + v(p), math.atan2(dv(p), du(p))), abs=1e-4)
+    assert (curvature, speed) == pytest.approx((bend, 1.0), abs=2e-3)
 
 
 def test_poly3_is_parametrized_by_arc_length() -> None:
