@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import pytest
 from recorded_scene import RunScene
-from storyboard_xml import lane_position_xml, speed_xml, teleport_xml
+from storyboard_xml import lane_position_xml, speed_xml, teleport_xml, world_position_xml
 from street_scene import NOTHING, after
 from trajectories import CORNER, follow_points
 from whole_run import Run
@@ -359,3 +359,18 @@ def test_displacement_follows_the_heading_of_the_reference_in_each_step(
         place = played.at(time)
         for value, wanted in zip((place.x, place.y), expected, strict=True):
             assert wanted is None or value == pytest.approx(wanted, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        change(lane(-2)),
+        offset('<AbsoluteTargetLaneOffset value="0.5"/>'),
+        keep_beside('distance="1" freespace="true"'),
+    ],
+)
+@pytest.mark.parametrize(("x", "y"), [(-30, -2), (100, -90)])
+def test_lateral_action_outside_the_road_is_an_error(scene: RunScene, action: str, x: float, y: float) -> None:
+    """Before the start of the road, and 82 m beside it."""
+    with pytest.raises(ScenarioError, match="'Ego' is off the road at the start; place the actor on a lane first"):
+        scene(2, ("Ego", teleport_xml(world_position_xml(x, y))), ("Ego", action, after(0.5)))

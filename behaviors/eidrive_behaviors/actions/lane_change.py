@@ -114,6 +114,8 @@ class LaneChangeAction(ActionBehaviour):
             )
         if self.actor.motion.location is None:
             self.actor.motion.snap_to_lane()
+        if self.actor.motion.location is None and not self.actor.driven:
+            raise off_road_error(self)
         moved = self.actor.motion.set_reference_lane(self._lane) or here
         way = self._roads.driving_direction(moved.road, self._lane)
         start, target = moved.offset * way, (self.action.target_lane_offset or 0.0) * way

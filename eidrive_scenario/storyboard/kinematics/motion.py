@@ -294,14 +294,17 @@ class Motion(MotionState):
 
     def _move_freely(self, distance: float) -> None:
         x, y, z, h, p, r = self._pose
-        x, y = x + distance * math.cos(h), y + distance * math.sin(h)
-        if self.roads is not None and distance != 0.0:
-            self._location = self.roads.locate_at(x, y, self._location)
-            if self._location is not None:
-                ground = self.roads.lane_pose_at(*self._location[:4])
-                z, p, r = ground.z, *ground.turned(wrap_angle(h - ground.h))[4:]
-                self._heading = self._heading_at(self._location, h)
-        self._pose = Pose(x, y, z, h, p, r)
+        self._pose = Pose(x + distance * math.cos(h), y + distance * math.sin(h), z, h, p, r)
+        if self.roads is None or distance == 0.0:
+            return
+        before = self._location
+        location = self.roads.locate_at(self._pose.x, self._pose.y, before)
+        if location is not None:
+            ground = self.roads.lane_pose_at(*location[:4])
+            self._pose = Pose(*self._pose[:2], ground.z, h, *ground.turned(wrap_angle(h - ground.h))[4:])
+        self._set_location(location)
+        if before is None and self._location is not None:
+            self._crosses = abs(math.cos(self._heading)) < ACROSS
 
 
 MIN_LANE_CHANGE_LENGTH = 1.0

@@ -182,6 +182,30 @@ def test_actor_pointing_across_the_road_crosses_it(street: Any) -> None:
     assert (placement.x, placement.y) == pytest.approx((100.0, 0.0), abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("x", "y", "yaw", "expected"),
+    [
+        (-20.0, -2.0, 0.0, (20.0, -2.0)),
+        (210.0, -2.0, 0.0, (250.0, -2.0)),
+        (-20.0, 30.0, math.pi / 2, (-20.0, 70.0)),
+        (100.0, -60.0, math.pi / 2, (100.0, -20.0)),
+    ],
+)
+def test_actor_outside_the_road_drives_straight_on(
+    street: Any, x: float, y: float, yaw: float, expected: tuple[float, float]
+) -> None:
+    """40 m in steps of 1 m: onto the road, away from its end, past its corner, and toward its side."""
+    motion = Motion(street)
+    motion.teleport(ResolvedPosition(Pose(x, y, 0.0, yaw, 0.0, 0.0), street.locate_at(x, y)))
+    motion.initialize()
+    motion.set_speed(10.0)
+    for _ in range(40):
+        before, placement = motion.pose, motion.step(0.1)
+        assert math.dist(before[:2], (placement.x, placement.y)) == pytest.approx(1.0)
+    assert (placement.x, placement.y) == pytest.approx(expected)
+    assert placement.yaw == pytest.approx(yaw)
+
+
 def test_actor_snaps_to_its_lane_after_free_pose(street: Any) -> None:
     motion = on_lane(street, -1, 100.0)
     motion.set_speed(10.0)
