@@ -361,16 +361,20 @@ def test_displacement_follows_the_heading_of_the_reference_in_each_step(
             assert wanted is None or value == pytest.approx(wanted, abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    "action",
-    [
-        change(lane(-2)),
-        offset('<AbsoluteTargetLaneOffset value="0.5"/>'),
-        keep_beside('distance="1" freespace="true"'),
-    ],
-)
-@pytest.mark.parametrize(("x", "y"), [(-30, -2), (100, -90)])
+OFF_ROAD = [(-30, -2), (100, -90)]
+"""Before the start of the road, and 82 m beside it."""
+
+
+@pytest.mark.parametrize("action", [change(lane(-2)), offset('<AbsoluteTargetLaneOffset value="0.5"/>')])
+@pytest.mark.parametrize(("x", "y"), OFF_ROAD)
 def test_lateral_action_outside_the_road_is_an_error(scene: RunScene, action: str, x: float, y: float) -> None:
-    """Before the start of the road, and 82 m beside it."""
     with pytest.raises(ScenarioError, match="'Ego' is off the road at the start; place the actor on a lane first"):
         scene(2, ("Ego", teleport_xml(world_position_xml(x, y))), ("Ego", action, after(0.5)))
+
+
+@pytest.mark.parametrize(("x", "y"), OFF_ROAD)
+def test_lateral_distance_outside_the_road_is_a_warning(run: Run, x: float, y: float) -> None:
+    action, beside = keep_beside('distance="1" freespace="true"'), {"Other": (-1, 150.0, 10.0)}
+    steps = ("Ego", teleport_xml(world_position_xml(x, y))), ("Ego", action, after(0.5))
+    played = run(2.0, *steps, driven=False, others=beside)
+    assert any("no effect on 'Ego', which is off the road" in str(text) for text in played.result.warnings)

@@ -7,7 +7,7 @@ import math
 from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import check_other_entity, check_presence, warn_without_effect
-from eidrive_behaviors.actions.lane_change import STANDING, off_road_error
+from eidrive_behaviors.actions.lane_change import STANDING
 from eidrive_behaviors.actions.longitudinal_distance import STIFFNESS, infinite_if_none
 from eidrive_scenario.api.actions import (
     STEEPEST,
@@ -48,7 +48,8 @@ class LateralDistanceAction(ActionBehaviour):
         if self.actor.motion.location is None:
             self.actor.motion.snap_to_lane()
         if self.actor.motion.location is None and not self.actor.driven:
-            raise off_road_error(self)
+            what = f"no effect on {self.actor.name!r}, which is off the road at the start"
+            self.warn(what, "place the actor on a lane first")
         self._nearest_side = -1.0 if self._lateral_gap() > 0.0 else 1.0
 
     def update(self) -> Status:

@@ -79,6 +79,8 @@ STANDSTILL = 1e-9
 """Maximum path length per unit of the parameter of a cubic at which it has no direction, and no curvature."""
 MIN_CUBICS = 16
 """Minimum number of cubics that replace one curve, so that a short curve with a large bend keeps its shape."""
+UNIFORM = 1e-4
+"""Maximum distance along a curve by which a parameter that is proportional to s may be wrong [m]."""
 MAX_CUBICS = 20_000
 """Maximum number of cubics that replace one curve. Cubics of a longer curve are longer than a meter."""
 
@@ -257,6 +259,8 @@ def _over_arc_length(curve: Cubic, end: float, arc_length: float | None = None) 
     half = 0.5 * np.diff(edges)
     middle = 0.5 * (edges[1:] + edges[:-1])
     arc = np.concatenate([[0.0], np.cumsum(half * (speed(middle[:, None] + half[:, None] * nodes) @ weights))])
+    if arc_length is None and float(np.abs(arc - edges * (arc[-1] / end)).max()) < UNIFORM:
+        return [replace(curve, u=_stretched(curve.u, end / curve.length), v=_stretched(curve.v, end / curve.length))]
     knots = np.linspace(0.0, float(arc[-1]) if arc_length is None else arc_length, count + 1)
     cell = np.clip(np.searchsorted(arc, knots, side="right") - 1, 0, len(half) - 1)
     p = np.interp(knots, arc, edges)
@@ -278,6 +282,12 @@ def _over_arc_length(curve: Cubic, end: float, arc_length: float | None = None) 
         )
         for i in range(count)
     ]
+
+
+def _stretched(polynomial: Coefficients, pace: float) -> Coefficients:
+    """Return the polynomial of s whose value at s is that of the given one at pace·s."""
+    a, b, c, d = polynomial
+    return a, b * pace, c * pace**2, d * pace**3
 
 
 def _hermite(value: Array, slope: Array, i: int, step: float) -> Coefficients:

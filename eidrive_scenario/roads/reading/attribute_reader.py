@@ -46,6 +46,10 @@ class AttributeReader:
         if before <= limit < before + amount:
             self.report_error(element, f"the file has more than {limit:g} {what}", "split it")
 
+    def has_spent(self, what: str, limit: float) -> bool:
+        """Return whether more of a limited resource is used than allowed."""
+        return self._spent.get(what, 0.0) > limit
+
     def report_warning(self, element: etree._Element, rule: MapRule, kind: str, message: str, hint: str) -> None:
         """Append a warning of a deviation from the standard with which the element is readable."""
         if len(self.map_warnings) < MAX_WARNINGS:
