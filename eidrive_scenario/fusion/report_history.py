@@ -61,7 +61,8 @@ class ReportHistory:
     filtered again. The result equals that of reports in order of measurement. This is the exact solution for
     out-of-sequence measurements at the cost of memory (Bar-Shalom, Update with out-of-sequence measurements in
     tracking: exact solution, IEEE Transactions on Aerospace and Electronic Systems 38, 2002). Reports older than all
-    stored ones are ignored. Of two reports with the same time the last received one is used.
+    stored ones are ignored. Of two reports with the same time the last received one is used; incomplete ones, as the
+    segments of one CPM, are joined.
     """
 
     def __init__(self, span: float, gate: AssociationGate) -> None:
@@ -179,6 +180,8 @@ class ReportHistory:
                 continue
             index = bisect_left(reports, time, key=lambda held: held.detections.time)
             again = index < len(reports) and reports[index].detections.time == time
+            if again and not (report.complete or reports[index].complete):
+                report = _joined(reports[index], report)
             reports[index : index + again] = [report]
             kept = min(kept, index)
         history.new.clear()
@@ -213,6 +216,25 @@ class ReportHistory:
         for history in histories:
             start, end = end, end + history.end - history.start
             history.start, history.end = start, end
+
+
+def _joined(first: Report, second: Report) -> Report:
+    """Return the report with the objects of two incomplete ones of the same time; the second has precedence."""
+    one, other = first.detections, second.detections
+    if len(other) > len(other.tracks):  # without ids, objects of both reports cannot be told apart
+        return second
+    rest = one.subset([row for row, number in enumerate(one.tracks) if number not in other.tracks])
+    detections = msgspec.structs.replace(
+        other,
+        classes=rest.classes + other.classes,
+        tracks=rest.tracks + other.tracks,
+        existence=np.concatenate([rest.confidence, other.confidence]),
+        **{
+            name: np.concatenate([getattr(rest, name), getattr(other, name)])
+            for name in ("boxes", "scores", "velocity", "covariance")
+        },
+    )
+    return msgspec.structs.replace(second, detections=detections)
 
 
 def _ends_of(histories: Sequence[_History]) -> tuple[Integers, Integers]:

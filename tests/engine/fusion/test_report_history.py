@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.randomness import generator
@@ -114,6 +115,19 @@ def test_report_history_ignores_reports_older_than_all_stored_ones(report: Make)
 def test_fuse_duplicate_reports_count_once(report: Make, fuse: Fuse) -> None:
     reports = drive(report, 1, tracked=False)
     assert_equal(fuse(reports, 1.5), fuse([*reports, *reports[-8:], reports[-3]], 1.5))
+
+
+@pytest.mark.parametrize("later", [False, True])
+def test_fuse_segments_of_one_message_equals_the_whole_message(later: bool, report: Make, fuse: Fuse) -> None:
+    """Segments have the same time of measurement; the second can arrive in a later tick, the first twice."""
+    places = [(0.0, 0.0), (0.9, 0.0), (20.0, 0.0), (40.0, 0.0)]
+    whole = report("A", 0.1, places, tracks=(1, 2, 3, 4), kind="pedestrian", size=(0.5, 0.5, 1.8), complete=False)
+    before = report("A", 0.0, places[:2], tracks=(1, 2), kind="pedestrian", size=(0.5, 0.5, 1.8), complete=False)
+    first, second = (replace(whole, detections=whole.detections.subset(rows)) for rows in ((0, 2), (1, 3)))
+    fusion = CovarianceIntersectionFusion()
+    fuse([before, first, *([] if later else [second, first])], 0.1, fusion)
+    fused = fuse([second, first] if later else [first], 0.3, fusion)
+    assert_equal(fuse([before, whole], 0.3), fused.subset(np.argsort(fused.boxes[:, 0]).tolist()))
 
 
 def test_report_history_has_bounded_size(report: Make) -> None:
