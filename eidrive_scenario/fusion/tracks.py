@@ -230,13 +230,14 @@ def _update(old: Table, new: Table) -> Table:
     """Update predicted tracks with the boxes `new` of a report; return `new` with the updated state."""
     after = new
     still, measured = ~new["moving"], new["measured"]
-    if still.any():
+    filtered = still | measured
+    if filtered.any():
         # The existence probability of a tracking station includes its past; other reports are independent.
-        given, before = new[still], old[still]
+        given, before = new[filtered], old[filtered]
         spread = before["covariance"][:, :2, :2] + given["covariance"][:, :2, :2]
         squared, determinant = squared_mahalanobis(given["mean"][:, :2] - before["mean"][:, :2], spread)
         existence = detected(before["existence"], likelihood_ratio(squared, determinant, given["score"]))
-        after["existence"][still] = np.where(given["judged"], given["existence"], existence)
+        after["existence"][filtered] = np.where(given["judged"], given["existence"], existence)
         after["moving"][still] = True
     for rows, size in ((still, 2), (measured, 4)):
         if rows.any():

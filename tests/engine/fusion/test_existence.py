@@ -89,6 +89,24 @@ def test_existence_after_missed_detection_equals_that_of_the_tracker(report: Mak
     assert found[0] == pytest.approx(float(missed(np.array(0.9 * np.exp(-0.1 / LIFETIME)))), rel=1e-6)
 
 
+@pytest.mark.parametrize("velocity_deviation", [None, 1.5])
+def test_existence_after_second_detection_equals_hand_calculation(
+    velocity_deviation: float | None, report: Make, fuse: Fuse
+) -> None:
+    """r L / (1 - r + r L) with r = 0.8 exp(-0.01), L = 0.1 + 4 / (0.01 · 2 pi S), S = 0.08 + 0.01 V + 0.002 m², and
+    V = 1.5² of a measured velocity, or 12² m²/s² without one."""
+    velocity = (10.0, 0.0) if velocity_deviation else (np.nan, np.nan)
+    positions = (0.0, 1.0) if velocity_deviation else (0.0, 0.0)
+    reports = [
+        report("A", time, [(x, 0.0)], velocity=velocity, velocity_deviation=velocity_deviation, score=0.8)
+        for time, x in zip((0.0, 0.1), positions, strict=True)
+    ]
+    spread = 0.082 + 0.01 * (velocity_deviation or 12.0) ** 2
+    before, ratio = 0.8 * np.exp(-0.01), 0.1 + 4.0 / (0.01 * 2.0 * np.pi * spread)
+    expected = before * ratio / (1.0 - before + before * ratio)
+    assert fuse(reports, 0.1).existence[0] == pytest.approx(expected, abs=1e-9)
+
+
 def test_average_without_existence_returns_none(report: Make) -> None:
     fused = AverageFusion().fuse([report("A", 0.0, [(10.0, 0.0)]), report("B", 0.0, [(10.5, 0.0)])], 0.0)
     assert fused.existence.shape == (0,)
