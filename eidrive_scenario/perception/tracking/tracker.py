@@ -21,6 +21,7 @@ from eidrive_scenario.perception.tracking.association import (
     likelihood_ratio,
     make_plausible,
     missed,
+    squared_mahalanobis,
     survived,
 )
 from eidrive_scenario.perception.tracking.interacting_models import SIGNIFICANT, InteractingModels, Tracks
@@ -172,9 +173,11 @@ class Tracker(TrackingMethod):
             if row not in rows:
                 rows.append(row)
                 columns.append(column)
-                # It says that the object is there, and little about its place.
+                # It says that the object is there, and little about its place: as much as a box at the limit of the
+                # gate. If it said nothing, a track that falls behind its object would stay there.
                 offset = detections.boxes[column, :2] - expected.state[row, :2]
-                noise[column] += np.outer(offset, offset)
+                squared = squared_mahalanobis(offset, expected.covariance[row, :2, :2] + noise[column])[0]
+                noise[column] += (1.0 / self._gate - 1.0 / squared) * np.outer(offset, offset)
         hit = set(rows)
         self._update_existence(expected, rows, detections, columns, noise, in_view)
         if rows:

@@ -327,6 +327,22 @@ def test_boxes_on_the_body_of_a_track_are_no_other_objects() -> None:
     assert held.tracks == (1, 2)
 
 
+@pytest.mark.parametrize("speed", [3.0, 5.0])
+def test_tracks_of_cars_that_set_off_follow_them(speed: float) -> None:
+    """40 cars stand for 3 s, then drive. The boxes, with errors of 0.2 m in each axis, are soon outside the gate of a
+    track at rest, and on its body for more than a second. No track falls behind by a third of a car."""
+    rng = np.random.default_rng(1)
+    track = tracker()
+    for scan in range(60):
+        places = [(max(0.0, speed * (DT * scan - 3.0)), 40.0 * car) for car in range(40)]
+        measured = [tuple(np.add(place, rng.normal(0.0, 0.2, 2))) for place in places]
+        held = track.update(cars(DT * scan, *measured, deviation=0.2))
+        if scan > 5:
+            assert len(held) == 40
+            nearest = np.linalg.norm(held.boxes[:, None, :2] - np.array(places), axis=2).min(axis=0)
+            assert nearest.max() < 1.5
+
+
 def test_box_that_overlaps_a_body_is_no_other_object() -> None:
     """A car ends at 22.3 m. A box from 21.1 m on overlaps it by 1.2 m, more than two cars in a row; one from 22.1 m on
     may be a second car, and a pedestrian 0.1 m beside its side is one."""
