@@ -177,7 +177,7 @@ class Tracker(TrackingMethod):
                 # gate. If it said nothing, a track that falls behind its object would stay there.
                 offset = detections.boxes[column, :2] - expected.state[row, :2]
                 squared = squared_mahalanobis(offset, expected.covariance[row, :2, :2] + noise[column])[0]
-                noise[column] += (1.0 / self._gate - 1.0 / squared) * np.outer(offset, offset)
+                noise[column] += (1.0 / self._gate - 1.0 / max(squared, self._gate)) * np.outer(offset, offset)
         hit = set(rows)
         self._update_existence(expected, rows, detections, columns, noise, in_view)
         if rows:
