@@ -81,7 +81,7 @@ def test_uninterruptible_run_of_worker_does_not_affect_other_runs(project: pytes
     write_scenario(folder / "native.xosc", detector="hangs_in_c")
     for name in SOUND[:3]:
         write_scenario(folder / f"{name}.xosc")
-    arguments = ("hung", "-n", "2", "--junitxml", "junit.xml", "-p", "no:cacheprovider", "--eidrive-wall-limit", "6")
+    arguments = ("hung", "-n", "1", "--junitxml", "junit.xml", "-p", "no:cacheprovider", "--eidrive-wall-limit", "6")
     project.runpytest_subprocess(*arguments).assert_outcomes(passed=3, errors=1)
     cases = cases_of(project.path / "junit.xml")
     code = project.path / "package" / "faulty.py"

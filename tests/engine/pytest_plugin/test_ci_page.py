@@ -14,6 +14,7 @@ import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 import yaml
@@ -86,7 +87,8 @@ def test_commands_of_example_pass_in_new_project(tmp_path: Path) -> None:
     assert [line.split()[0] for line in executed] == ["eidrive", "pytest", "eidrive"]
     for command in executed:
         run(command, project)
-    assert (project / "reports" / "junit.xml").is_file()
+    (suite,) = ElementTree.parse(project / "reports" / "junit.xml").getroot()
+    assert suite.get("tests") == "5", "the scenario as a test item, three gaps, and a success rate"
     assert (project / "reports" / "report.html").is_file()
     assert list((project / "reports" / "runs").rglob("recording.mcap"))
     assert (tmp_path / "step.md").is_file()

@@ -44,8 +44,8 @@ def attached(texts: list[str]) -> list[str]:
 @pytest.mark.process
 def test_failed_run_has_absolute_attachments(project: pytest.Pytester) -> None:
     """Jenkins requires absolute paths. The files exist, and only the failed run has them."""
-    arguments = ("--junitxml", "junit.xml", "--eidrive-out", "runs", "-n", "2", "-p", "no:cacheprovider")
-    project.runpytest_subprocess("xosc", *arguments).assert_outcomes(passed=1, failed=1, errors=1)
+    arguments = ("--junitxml", "junit.xml", "--eidrive-out", "runs", "-n", "1", "-p", "no:cacheprovider")
+    project.runpytest_inprocess("xosc", *arguments).assert_outcomes(passed=1, failed=1, errors=1)
     texts = outputs(project.path / "junit.xml")
     assert (texts["far"], texts["wrong"]) == ([], [])
     paths = [Path(path) for path in attached(texts["near"])]
@@ -66,7 +66,7 @@ def test_attachments_of_gitlab_are_relative_to_project(
         """
     )
     arguments = ("--junitxml", "junit.xml", "--eidrive-out", "runs", "-o", "junit_logging=system-out")
-    project.runpytest_subprocess("test_attachments_of_gitlab_are_relative_to_project.py", *arguments)
+    project.runpytest_inprocess("test_attachments_of_gitlab_are_relative_to_project.py", *arguments)
     (texts,) = outputs(project.path / "junit.xml").values()
     assert "printed" in texts[0]
     paths = attached(texts)
@@ -83,7 +83,7 @@ def test_github_session_writes_annotations_and_summary_once(
     step = project.path / "step.md"
     step.write_text("# before\n", encoding="utf-8")
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(step))
-    result = project.runpytest_subprocess("xosc", "-n", "2", "-q", "-p", "no:cacheprovider")
+    result = project.runpytest_inprocess("xosc", "-n", "1", "-q", "-p", "no:cacheprovider")
     commands = [line for line in result.outlines if line.startswith("::")]
     declared = PASSING_BY.read_text(encoding="utf-8").splitlines()
     near, wrong = sorted(commands)
@@ -102,7 +102,7 @@ def test_github_session_writes_annotations_and_summary_once(
 
 def test_session_outside_of_github_writes_neither(project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(project.path / "step.md"))
-    result = project.runpytest_subprocess("xosc/wrong.xosc", "-p", "no:cacheprovider")
+    result = project.runpytest_inprocess("xosc/wrong.xosc", "-p", "no:cacheprovider")
     result.stdout.no_fnmatch_line("::*")
     assert not (project.path / "step.md").exists()
 
@@ -110,7 +110,7 @@ def test_session_outside_of_github_writes_neither(project: pytest.Pytester, monk
 def test_unwritable_summary_is_reported(project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GITHUB_ACTIONS", "true")
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(project.path / "no" / "step.md"))
-    result = project.runpytest_subprocess("xosc/far.xosc", "-p", "no:cacheprovider")
+    result = project.runpytest_inprocess("xosc/far.xosc", "-p", "no:cacheprovider")
     result.assert_outcomes(passed=1)
     result.stdout.fnmatch_lines(["GITHUB_STEP_SUMMARY: the summary is not written (*"])
 

@@ -121,7 +121,7 @@ def test_channel_option_is_repeatable(project: pytest.Pytester) -> None:
 
 @pytest.mark.process
 def test_collection_without_arguments_under_xdist_ignores_scenarios(project: pytest.Pytester) -> None:
-    result = project.runpytest_subprocess("-n", "1", "-p", "no:cacheprovider")
+    result = project.runpytest_inprocess("-n", "1", "-p", "no:cacheprovider")
     result.assert_outcomes(passed=1)
 
 

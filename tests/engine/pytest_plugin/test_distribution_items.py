@@ -82,8 +82,8 @@ def test_distribution_without_omitted_runs_prints_no_report(
 @pytest.mark.process
 def test_omitted_runs_of_xdist_workers_are_reported(pytester: pytest.Pytester, vary: Callable[[str], Path]) -> None:
     vary(values_xml("OtherY", "5", "4.5", "4"))
-    arguments = ("vary.xosc", "--eidrive-max-runs", "2", "-n", "2", "-p", "no:cacheprovider")
-    result = pytester.runpytest_subprocess(*arguments)
+    arguments = ("vary.xosc", "--eidrive-max-runs", "2", "-n", "1", "-p", "no:cacheprovider")
+    result = pytester.runpytest_inprocess(*arguments)
     result.assert_outcomes(passed=2)
     result.stdout.fnmatch_lines(["vary.xosc: 2 of 3 runs are tests, 1 are omitted"])
 
@@ -93,7 +93,7 @@ def test_distribution_items_have_outcomes_and_properties(
 ) -> None:
     path = vary(values_xml("OtherY", "5", "0", "9"))
     arguments = ("vary.xosc", "--junitxml", "junit.xml", "--eidrive-out", "runs", "-rs", "-p", "no:cacheprovider")
-    result = pytester.runpytest_subprocess(*arguments)
+    result = pytester.runpytest_inprocess(*arguments)
     result.assert_outcomes(passed=1, failed=1, skipped=1)
     result.stdout.fnmatch_lines(
         [

@@ -26,7 +26,7 @@ def project(pytester: pytest.Pytester) -> pytest.Pytester:
 def run(pytester: pytest.Pytester, *arguments: str, text: str = "") -> pytest.RunResult:
     if text:
         pytester.makepyfile(test_own="import pytest\n" + text)
-    return pytester.runpytest_subprocess("-v", "--strict-markers", "-p", "no:cacheprovider", *arguments)
+    return pytester.runpytest_inprocess("-v", "--strict-markers", "-p", "no:cacheprovider", *arguments)
 
 
 def properties(pytester: pytest.Pytester) -> dict[str | None, str | None]:

@@ -68,7 +68,7 @@ def test_short_summary_contains_reason_at_any_width(
     test = rf"{name}\.xosc::{name}\[seed=1\]"
     for columns, line in ((80, rf"FAILED \({reason}\) {test}"), (200, rf"FAILED {test} - {reason}: Ego and Parked.*")):
         monkeypatch.setenv("COLUMNS", str(columns))
-        result = pytester.runpytest_subprocess(f"{name}.xosc", "-p", "no:cacheprovider", *workers)
+        result = pytester.runpytest_inprocess(f"{name}.xosc", "-p", "no:cacheprovider", *workers)
         (summary,) = [one for one in result.outlines if one.startswith("FAILED")]
         assert re.fullmatch(line, summary)
 
@@ -80,7 +80,7 @@ def test_command_of_options_reproduces_run(pytester: pytest.Pytester) -> None:
     text = PASSING_BY.read_text(encoding="utf-8")
     (folder / "near by.xosc").write_text(text.replace('value="5.0"', 'value="0.0"'), encoding="utf-8")
     (folder / "late.yaml").write_text("delay: {kind: constant, seconds: 0.2}", encoding="utf-8")
-    result = pytester.runpytest_subprocess(
+    result = pytester.runpytest_inprocess(
         str(folder),
         *("--eidrive-channel", "it's a folder/late.yaml", "--eidrive-time-limit", "2.5", "-p", "no:cacheprovider"),
         *("--eidrive-criterion", '{max_speed: {of: Ego, at_most: 90, name: "Ego\'s $HOME"}}'),
@@ -102,17 +102,19 @@ def test_command_of_scenario_without_file_reproduces_test(pytester: pytest.Pytes
     pytester.makepyfile(
         **{
             "test_own": """
+            import pathlib
+
             import pytest
 
             @pytest.mark.parametrize("value", ["0", "it's [0]"])
             def test_object(run_scenario, value):
-                source = open("scene.xosc", "rb").read().replace(b'value="5.0"', b'value="0.0"')
+                source = pathlib.Path("scene.xosc").read_bytes().replace(b'value="5.0"', b'value="0.0"')
                 assert run_scenario(source).passed
             """
         }
     )
     options = ("--eidrive-time-limit", "2.5", "--eidrive-criterion", "{max_speed: {of: Ego, at_most: 90}}")
-    result = pytester.runpytest_subprocess(*options, "-p", "no:cacheprovider", "-k", "it")
+    result = pytester.runpytest_inprocess(*options, "-p", "no:cacheprovider", "-k", "it")
     result.assert_outcomes(failed=1, deselected=1)
     (command,) = {line.removeprefix("reproduce: ") for line in result.outlines if line.startswith("reproduce: ")}
     words = command.replace("pytest ", f"{sys.executable} -m pytest -p no:cacheprovider ", 1)

@@ -25,7 +25,7 @@ def project(pytester: pytest.Pytester) -> pytest.Pytester:
 
 def run(pytester: pytest.Pytester, text: str, *arguments: str) -> pytest.RunResult:
     pytester.makepyfile(test_own="import pytest\n" + text)
-    return pytester.runpytest_subprocess("test_own.py", "-v", "--strict-markers", "-p", "no:cacheprovider", *arguments)
+    return pytester.runpytest_inprocess("test_own.py", "-v", "--strict-markers", "-p", "no:cacheprovider", *arguments)
 
 
 def test_marker_runs_every_scenario_channel_and_seed(project: pytest.Pytester) -> None:

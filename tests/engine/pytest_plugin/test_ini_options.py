@@ -25,7 +25,7 @@ def project(pytester: pytest.Pytester) -> pytest.Pytester:
 
 
 def collected(pytester: pytest.Pytester, *arguments: str) -> list[str]:
-    result = pytester.runpytest_subprocess("--collect-only", "-q", "-p", "no:cacheprovider", *arguments)
+    result = pytester.runpytest_inprocess("--collect-only", "-q", "-p", "no:cacheprovider", *arguments)
     return [line.partition("[")[2] for line in result.outlines if "::" in line]
 
 
@@ -114,7 +114,7 @@ def test_ini_options_configure_runs(project: pytest.Pytester) -> None:
 )
 def test_invalid_ini_value_is_usage_error(project: pytest.Pytester, name: str, value: str, message: str) -> None:
     project.makeini(f"[pytest]\neidrive_{name} = {value}\n")
-    result = project.runpytest_subprocess("drives", "-p", "no:cacheprovider")
+    result = project.runpytest_inprocess("drives", "-p", "no:cacheprovider")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     pattern = f"*ini option eidrive_{name}: {message}*".replace("[", "[[]")
     result.stderr.fnmatch_lines([pattern])
@@ -129,6 +129,6 @@ def test_invalid_option_value_is_usage_error(project: pytest.Pytester) -> None:
         (("--eidrive-time-limit", "0"), "*--eidrive-time-limit: not a positive number of seconds (got '0')"),
         (("--eidrive-out", ""), "*--eidrive-out: no value is given (got '')"),
     ):
-        result = project.runpytest_subprocess("drives", *arguments, "-p", "no:cacheprovider")
+        result = project.runpytest_inprocess("drives", *arguments, "-p", "no:cacheprovider")
         assert result.ret == pytest.ExitCode.USAGE_ERROR
         result.stderr.fnmatch_lines([message])

@@ -19,7 +19,7 @@ PASSING_BY = Path(__file__).parents[2] / "data" / "passing_by.xosc"
 
 
 def test_scenario_items_have_outcomes_and_reasons(project: pytest.Pytester) -> None:
-    result = project.runpytest_subprocess("xosc", "-p", "no:cacheprovider")
+    result = project.runpytest_inprocess("xosc", "-p", "no:cacheprovider")
     result.assert_outcomes(passed=1, failed=1, errors=1)
     result.stdout.fnmatch_lines_random(
         [
@@ -36,7 +36,7 @@ def test_scenario_items_have_outcomes_and_reasons(project: pytest.Pytester) -> N
 @pytest.mark.process
 def test_junit_file_of_two_workers_contains_all_runs(project: pytest.Pytester) -> None:
     arguments = ("--eidrive-seeds", "2", "--eidrive-channel", "ideal,none", "-n", "2", "--junitxml", "junit.xml")
-    result = project.runpytest_subprocess("xosc/far.xosc", "xosc/near.xosc", *arguments, "-p", "no:cacheprovider")
+    result = project.runpytest_inprocess("xosc/far.xosc", "xosc/near.xosc", *arguments, "-p", "no:cacheprovider")
     result.assert_outcomes(passed=4, failed=4)
     cases = {
         f"{case.get('classname')}::{case.get('name')}": case
@@ -63,7 +63,7 @@ def test_junit_file_of_two_workers_contains_all_runs(project: pytest.Pytester) -
 
 
 def test_out_option_writes_folder_per_run(project: pytest.Pytester) -> None:
-    result = project.runpytest_subprocess(
+    result = project.runpytest_inprocess(
         "xosc/far.xosc", "--eidrive-out", "runs", "--eidrive-seeds", "2", "-p", "no:cacheprovider"
     )
     result.assert_outcomes(passed=2)
@@ -77,7 +77,7 @@ def test_out_option_writes_folder_per_run(project: pytest.Pytester) -> None:
 
 def test_record_option_keeps_recordings_of_failed_runs(project: pytest.Pytester) -> None:
     arguments = ("xosc/far.xosc", "xosc/near.xosc", "--eidrive-out", "runs", "--eidrive-record", "on-failure")
-    project.runpytest_subprocess(*arguments, "-p", "no:cacheprovider").assert_outcomes(passed=1, failed=1)
+    project.runpytest_inprocess(*arguments, "-p", "no:cacheprovider").assert_outcomes(passed=1, failed=1)
     kept = [path.relative_to(project.path / "runs/xosc") for path in project.path.glob("runs/**/*.*")]
     assert sorted((path.parts[0], path.name) for path in kept) == [
         ("far", "result.json"),
@@ -89,13 +89,13 @@ def test_record_option_keeps_recordings_of_failed_runs(project: pytest.Pytester)
 @pytest.mark.process
 def test_topics_option_adds_topics_of_other_tools(project: pytest.Pytester) -> None:
     arguments = ("xosc/far.xosc", "--eidrive-out", "runs", "--eidrive-topics", "osi,foxglove")
-    project.runpytest_subprocess(*arguments, "-p", "no:cacheprovider").assert_outcomes(passed=1)
+    project.runpytest_inprocess(*arguments, "-p", "no:cacheprovider").assert_outcomes(passed=1)
     (recording,) = project.path.glob("runs/**/recording.mcap")
     with recording.open("rb") as stream:
         summary = make_reader(stream).get_summary()
     assert summary is not None
     assert {channel.topic for channel in summary.channels.values()} >= {"/frame", "/tf", "ground_truth"}
-    wrong = project.runpytest_subprocess("xosc/far.xosc", "--eidrive-topics", "rviz")
+    wrong = project.runpytest_inprocess("xosc/far.xosc", "--eidrive-topics", "rviz")
     wrong.stderr.fnmatch_lines(["*--eidrive-topics: not some of foxglove, osi (got 'rviz')*"])
 
 
@@ -103,7 +103,7 @@ def test_topics_option_adds_topics_of_other_tools(project: pytest.Pytester) -> N
 def test_option_of_kept_files_without_their_folder_is_a_usage_error(
     project: pytest.Pytester, option: tuple[str, str]
 ) -> None:
-    done = project.runpytest_subprocess("xosc/far.xosc", *option)
+    done = project.runpytest_inprocess("xosc/far.xosc", *option)
     assert done.ret == pytest.ExitCode.USAGE_ERROR
     done.stderr.fnmatch_lines([f"*{option[0]} without --eidrive-out has no effect*"])
 
@@ -111,7 +111,7 @@ def test_option_of_kept_files_without_their_folder_is_a_usage_error(
 @pytest.mark.process
 def test_trace_hash_does_not_depend_on_test_order(project: pytest.Pytester) -> None:
     def hashes(*arguments: str) -> dict[str, str]:
-        project.runpytest_subprocess(*arguments, "--junitxml", "junit.xml", "-p", "no:cacheprovider")
+        project.runpytest_inprocess(*arguments, "--junitxml", "junit.xml", "-p", "no:cacheprovider")
         found = {}
         for case in ElementTree.parse(project.path / "junit.xml").iter("testcase"):
             (trace,) = (entry.get("value") for entry in case.iter("property") if entry.get("name") == "trace_hash")
@@ -127,7 +127,7 @@ def test_trace_hash_does_not_depend_on_test_order(project: pytest.Pytester) -> N
 @pytest.mark.process
 def test_failure_prints_reproducing_command_and_recording(project: pytest.Pytester) -> None:
     arguments = ("--eidrive-channel", "{delay: {kind: constant, seconds: 0.1}}", "--eidrive-out", "kept runs")
-    result = project.runpytest_subprocess("xosc/near.xosc", *arguments, "-p", "no:cacheprovider")
+    result = project.runpytest_inprocess("xosc/near.xosc", *arguments, "-p", "no:cacheprovider")
     result.assert_outcomes(failed=1)
     # With CI=true pytest repeats the whole text in its summary.
     (command,) = {line for line in result.outlines if line.startswith("reproduce: ")}
@@ -149,7 +149,7 @@ def test_failure_prints_reproducing_command_and_recording(project: pytest.Pytest
 @pytest.mark.process
 def test_junit_properties_contain_all_settings(project: pytest.Pytester) -> None:
     arguments = ("--eidrive-channel", "{loss: {kind: bernoulli, probability: 0.5}}", "--junitxml", "junit.xml")
-    project.runpytest_subprocess("xosc/far.xosc", *arguments, "--eidrive-out", "runs", "-p", "no:cacheprovider")
+    project.runpytest_inprocess("xosc/far.xosc", *arguments, "--eidrive-out", "runs", "-p", "no:cacheprovider")
     (case,) = ElementTree.parse(project.path / "junit.xml").iter("testcase")
     properties = {str(entry.get("name")): str(entry.get("value")) for entry in case.iter("property")}
     (path,) = project.path.glob("runs/**/result.json")
@@ -165,14 +165,16 @@ def test_junit_properties_contain_all_settings(project: pytest.Pytester) -> None
 def test_failed_python_test_prints_command_of_run(project: pytest.Pytester) -> None:
     project.makepyfile(
         test_own="""
+        import pathlib
+
         def test_file(run_scenario):
             assert run_scenario("xosc/near.xosc", seed=4).passed
 
         def test_object(run_scenario):
-            assert run_scenario(open("xosc/near.xosc", "rb").read()).passed
+            assert run_scenario(pathlib.Path("xosc/near.xosc").read_bytes()).passed
         """
     )
-    result = project.runpytest_subprocess("test_own.py", "-p", "no:cacheprovider")
+    result = project.runpytest_inprocess("test_own.py", "-p", "no:cacheprovider")
     result.assert_outcomes(failed=2)
     near = project.path / "xosc" / "near.xosc"
     result.stdout.fnmatch_lines([f"reproduce: eidrive run {near} --seed 4"])

@@ -21,7 +21,8 @@ from pathlib import Path
 
 def pytest_runtest_teardown(item):
     root = Path(item.config.rootpath)
-    (root / "attempts.txt").open("a").write("x")
+    with (root / "attempts.txt").open("a") as attempts:
+        attempts.write("x")
     if len((root / "attempts.txt").read_text()) == 2:
         shutil.copy(root / "good", root / "drives" / "first.xosc")
 """
@@ -36,7 +37,7 @@ def test_rerun_reads_and_runs_scenario_again(pytester: pytest.Pytester, broken: 
     (pytester.mkdir("drives") / "first.xosc").write_text(text.replace(*broken), encoding="utf-8")
     pytester.makeconftest(MENDS)
     arguments = ("drives", "--reruns", "3", "--junitxml", "junit.xml", "-p", "no:cacheprovider")
-    outcomes = pytester.runpytest_subprocess(*arguments).parseoutcomes()
+    outcomes = pytester.runpytest_inprocess(*arguments).parseoutcomes()
     assert (outcomes["rerun"], outcomes["passed"], outcomes.get("failed", 0)) == (2, 1, 0)
     case = list(ElementTree.parse(pytester.path / "junit.xml").iter("testcase"))[-1]
     names = [entry.get("name") for entry in case.iter("property")]
@@ -58,7 +59,7 @@ def test_rerun_of_python_test_reports_last_attempt(pytester: pytest.Pytester) ->
         """
     )
     arguments = ("--reruns", "2", "--junitxml", "junit.xml", "-p", "no:cacheprovider")
-    result = pytester.runpytest_subprocess(*arguments)
+    result = pytester.runpytest_inprocess(*arguments)
     assert result.parseoutcomes() == {"failed": 1, "rerun": 2}
     case = list(ElementTree.parse(pytester.path / "junit.xml").iter("testcase"))[-1]
     assert [entry.get("value") for entry in case.iter("property") if entry.get("name") == "seed"] == ["3"]

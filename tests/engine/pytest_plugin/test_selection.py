@@ -103,7 +103,7 @@ def test_names_with_spaces_and_brackets_run(project: pytest.Pytester) -> None:
         "my_odd_folder/cut_in_2_,_ü[seed=1]",
         "my_odd_folder/cut_in[seed=1]",
     ]
-    result = project.runpytest_subprocess(".", "-m", "my_odd_folder", "-p", "no:cacheprovider")
+    result = project.runpytest_inprocess(".", "-m", "my_odd_folder", "-p", "no:cacheprovider")
     result.assert_outcomes(passed=2, deselected=2)
 
 
@@ -123,10 +123,10 @@ def test_last_failures_of_workers_run_again(project: pytest.Pytester) -> None:
     path = project.path / "xosc" / "near" / "drive.xosc"
     text = path.read_text(encoding="utf-8")
     path.write_text(text.replace('value="5.0"', 'value="0.0"'), encoding="utf-8")
-    project.runpytest_subprocess("xosc", "-n", "2").assert_outcomes(passed=1, failed=1)
-    again = project.runpytest_subprocess("xosc", "--lf", "-v", "-n", "2")
+    project.runpytest_inprocess("xosc", "-n", "2").assert_outcomes(passed=1, failed=1)
+    again = project.runpytest_inprocess("xosc", "--lf", "-v", "-n", "2")
     again.assert_outcomes(failed=1)
     path.write_text(text, encoding="utf-8")
-    again = project.runpytest_subprocess("xosc", "--lf", "-v", "-p", "no:xdist")
+    again = project.runpytest_inprocess("xosc", "--lf", "-v", "-p", "no:xdist")
     again.assert_outcomes(passed=1)
     again.stdout.fnmatch_lines(["*near/drive?seed=1? PASSED*"])

@@ -25,9 +25,7 @@ def replays(page: Path) -> list[Path]:
 
 @pytest.mark.parametrize("workers", [[], ["-n", "2"]], ids=["one process", "two workers"])
 def test_session_writes_the_report_of_its_runs_once(project: pytest.Pytester, workers: list[str]) -> None:
-    result = project.runpytest_subprocess(
-        "xosc", "-p", "no:cacheprovider", "--eidrive-report", "out/all.html", *workers
-    )
+    result = project.runpytest_inprocess("xosc", "-p", "no:cacheprovider", "--eidrive-report", "out/all.html", *workers)
     result.assert_outcomes(passed=1, failed=1, errors=1)
     page = project.path / "out" / "all.html"
     result.stdout.fnmatch_lines(["*- report -*", str(page)])
@@ -39,9 +37,9 @@ def test_session_writes_the_report_of_its_runs_once(project: pytest.Pytester, wo
 
 def test_report_omits_runs_of_earlier_sessions(project: pytest.Pytester) -> None:
     common = ("-p", "no:cacheprovider", "--eidrive-out", "runs", "--eidrive-record", "on-failure")
-    project.runpytest_subprocess("xosc/near.xosc", *common)
+    project.runpytest_inprocess("xosc/near.xosc", *common)
     project.makeini("[pytest]\neidrive_report = pages")
-    result = project.runpytest_subprocess("xosc/far.xosc", *common)
+    result = project.runpytest_inprocess("xosc/far.xosc", *common)
     result.assert_outcomes(passed=1)
     page = project.path / "pages" / "report.html"
     assert lead(page) == "1 run: 1 passed."
@@ -50,7 +48,7 @@ def test_report_omits_runs_of_earlier_sessions(project: pytest.Pytester) -> None
 
 
 def test_report_without_any_run_is_not_written(project: pytest.Pytester) -> None:
-    result = project.runpytest_subprocess("xosc/wrong.xosc", "-p", "no:cacheprovider", "--eidrive-report", "page")
+    result = project.runpytest_inprocess("xosc/wrong.xosc", "-p", "no:cacheprovider", "--eidrive-report", "page")
     result.stdout.fnmatch_lines(["*page: not written, as no run has kept files"])
     assert not (project.path / "page").exists()
 
@@ -58,6 +56,6 @@ def test_report_without_any_run_is_not_written(project: pytest.Pytester) -> None
 def test_unwritable_report_is_an_error_in_the_summary(project: pytest.Pytester) -> None:
     (project.path / "file").write_text("", encoding="utf-8")
     options = ("--eidrive-report", "file/page.html", "--eidrive-out", "runs")
-    result = project.runpytest_subprocess("xosc/far.xosc", "-p", "no:cacheprovider", *options)
+    result = project.runpytest_inprocess("xosc/far.xosc", "-p", "no:cacheprovider", *options)
     result.assert_outcomes(passed=1)
     result.stdout.fnmatch_lines(["*file/page.html: not written: *"])

@@ -89,7 +89,7 @@ def test_decide_rate_passes_errors_of_runs() -> None:
 def test_marker_decides_rate_over_seeds(project: pytest.Pytester) -> None:
     """A test that is not decided at its limit fails, and the report lists the first failed runs with their commands."""
     project.makepyfile(test_rates=TEXT)
-    done = project.runpytest_subprocess("test_rates.py", "-v", "-p", "no:cacheprovider", "--junitxml", "junit.xml")
+    done = project.runpytest_inprocess("test_rates.py", "-v", "-p", "no:cacheprovider", "--junitxml", "junit.xml")
     done.assert_outcomes(passed=2, failed=2)
     done.stdout.fnmatch_lines(
         [
@@ -109,7 +109,7 @@ def test_marker_decides_rate_over_seeds(project: pytest.Pytester) -> None:
 
 
 def test_option_applies_to_scenario_files(project: pytest.Pytester) -> None:
-    done = project.runpytest_subprocess("drives", "-v", "-p", "no:cacheprovider", "--eidrive-success-rate", "0.5")
+    done = project.runpytest_inprocess("drives", "-v", "-p", "no:cacheprovider", "--eidrive-success-rate", "0.5")
     done.assert_outcomes(passed=1)
     done.stdout.fnmatch_lines(["*first?rate=0.5?*PASSED*"])
 
@@ -139,13 +139,13 @@ def test_invalid_marker_is_an_error(project: pytest.Pytester, argument: str, exp
         f'@pytest.mark.scenario("drives/first", {argument})\ndef test_rate(run_scenario):\n    pass\n'
     )
     project.makepyfile(test_rates=text)
-    done = project.runpytest_subprocess("test_rates.py", "-p", "no:cacheprovider")
+    done = project.runpytest_inprocess("test_rates.py", "-p", "no:cacheprovider")
     assert done.ret != 0
     done.stdout.fnmatch_lines([f"*{expected}*"])
 
 
 def test_invalid_option_is_a_usage_error(project: pytest.Pytester) -> None:
-    done = project.runpytest_subprocess("drives", "--eidrive-success-rate", "1.5")
+    done = project.runpytest_inprocess("drives", "--eidrive-success-rate", "1.5")
     assert done.ret == pytest.ExitCode.USAGE_ERROR
 
 

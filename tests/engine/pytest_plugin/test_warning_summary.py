@@ -26,7 +26,7 @@ SEEDS = "--eidrive-seeds 1 replaces the marker's seeds=3"
 def session(pytester: pytest.Pytester, expected: list[str], *options: str) -> pytest.RunResult:
     shutil.copy(PASSING_BY, pytester.path / "scene.xosc")
     pytester.makepyfile(test_marked=MARKED.format(expected=expected))
-    return pytester.runpytest_subprocess("-p", "no:cacheprovider", "test_marked.py", *options)
+    return pytester.runpytest_inprocess("-p", "no:cacheprovider", "test_marked.py", *options)
 
 
 def warnings_of(junit: Path) -> list[str | None]:
@@ -43,7 +43,7 @@ def test_option_that_replaces_marker_list_warns(pytester: pytest.Pytester) -> No
 
 @pytest.mark.process
 def test_warning_of_worker_is_reported_by_controller(pytester: pytest.Pytester) -> None:
-    options = ("--eidrive-channel", "latency_300ms", "-n", "2", "--junitxml", "junit.xml")
+    options = ("--eidrive-channel", "latency_300ms", "-n", "1", "--junitxml", "junit.xml")
     result = session(pytester, [CHANNEL], *options)
     result.assert_outcomes(passed=3)
     result.stdout.fnmatch_lines(["*warnings of runs*", f"*and 2 more: {CHANNEL.replace('[', '[[]')}"])
@@ -67,7 +67,7 @@ def test_warnings_of_scenario_files_are_shown_once(pytester: pytest.Pytester) ->
     )
     (pytester.path / "scene.xosc").write_text(text)
     options = ("--eidrive-seeds", "2", "--junitxml", "junit.xml")
-    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "scene.xosc", *options)
+    result = pytester.runpytest_inprocess("-p", "no:cacheprovider", "scene.xosc", *options)
     result.assert_outcomes(passed=2)
     result.stdout.fnmatch_lines(["*scene[[]seed=1] and 1 more: *scene.xosc:*: most messages take one step of 0.05 s*"])
     assert len(warnings_of(pytester.path / "junit.xml")) == 2

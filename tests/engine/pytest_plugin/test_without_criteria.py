@@ -25,7 +25,7 @@ def bare(project: pytest.Pytester) -> pytest.Pytester:
 
 
 def run(project: pytest.Pytester, *arguments: str) -> pytest.RunResult:
-    return project.runpytest_subprocess("xosc", "-p", "no:cacheprovider", *arguments)
+    return project.runpytest_inprocess("xosc", "-p", "no:cacheprovider", *arguments)
 
 
 @pytest.mark.exhaustive
@@ -83,6 +83,6 @@ def test_fixture_returns_result_that_is_not_passed(bare: pytest.Pytester) -> Non
             assert run_scenario("xosc/far.xosc", no_criteria=True).passed
         """
     )
-    result = bare.runpytest_subprocess("-p", "no:cacheprovider")
+    result = bare.runpytest_inprocess("-p", "no:cacheprovider")
     result.assert_outcomes(passed=2, failed=1)
     result.stdout.fnmatch_lines([f"*: {WORDS}*"])
