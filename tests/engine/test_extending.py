@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from command_fixtures import Eidrive, eidrive
 
+from eidrive_scenario.extensions import registry
 from eidrive_scenario.extensions.project import GROUPS
+
+__all__ = ["eidrive"]
 
 GUIDE = Path(__file__).parents[2] / "docs" / "extending.md"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -53,7 +57,7 @@ def files() -> dict[str, str]:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Write the files, and beside them the metadata that `pip install -e .` would create from pyproject.toml."""
     folder = tmp_path_factory.mktemp("acme")
     for name, text in files().items():
@@ -69,7 +73,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         for group, entries in project["entry-points"].items()
     ]
     (metadata / "entry_points.txt").write_text("\n".join(points))
-    return folder
+    registry._registries.clear()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(folder))
+        yield folder
+    registry._registries.clear()
+    for path in folder.glob("*.py"):
+        sys.modules.pop(path.stem, None)
 
 
 @pytest.fixture(scope="module")
@@ -78,18 +88,10 @@ def made(folder: Path) -> Path:
     for module in ("torch", "onnxscript"):
         pytest.importorskip(module, reason="needs the extras 'learned' and 'dev'")
     for script in scripts():
-        done = run_in(folder, sys.executable, *shlex.split(script)[1:])
+        command = [sys.executable, *shlex.split(script)[1:]]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
     return folder
-
-
-def run_in(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    environment = {
-        **os.environ,
-        "PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")]),
-        "COLUMNS": "160",
-    }
-    return subprocess.run(arguments, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
 
 def test_guide_has_an_example_of_every_kind_of_extension() -> None:
@@ -115,7 +117,12 @@ def test_guide_examples_are_short_and_import_the_api_only(name: str) -> None:
 @pytest.mark.process
 @pytest.mark.parametrize(("command", "expected"), commands(), ids=[command for command, _ in commands()])
 def test_guide_commands_print_the_expected_lines(
-    folder: Path, command: str, expected: tuple[str, ...], request: pytest.FixtureRequest
+    folder: Path,
+    command: str,
+    expected: tuple[str, ...],
+    eidrive: Eidrive,
+    request: pytest.FixtureRequest,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A run with failed criteria exits with 1, an interrupted one with 3."""
     program, *arguments = shlex.split(command)
@@ -128,9 +135,10 @@ def test_guide_commands_print_the_expected_lines(
         assert all((folder / name).is_file() for name in GENERATED_FILES)
         return
     assert program == "eidrive"
-    done = run_in(folder, sys.executable, "-m", "eidrive_scenario", *arguments)
+    monkeypatch.chdir(folder)
+    done = eidrive(*arguments)
     shown = " ".join(expected)
-    assert done.returncode == (1 if "failed" in shown else 3 if "time limit" in shown else 0), done.stdout + done.stderr
+    assert done.exit_code == (1 if "failed" in shown else 3 if "time limit" in shown else 0), done.output
     printed = " ".join(done.stdout.split())
     for line in expected:
         assert " ".join(line.split()) in printed
