@@ -33,14 +33,21 @@ def processor_time(work: Callable[[], Result]) -> tuple[Result, float]:
     return result, time.process_time() - began
 
 
+@cache
+def _first_unit() -> float:
+    """Return the processor time of a reading, measured once per process after one that loads modules [s]."""
+    return min(processor_time(lambda: load_scenario(_content()))[1] for _ in range(2))
+
+
 def within_readings(readings: float, work: Callable[[], Result]) -> Result:
     """Return the result of `work`; fail if it takes more than `readings` times the reading of 10,000 parameters.
 
-    Other processes slow down memory and caches, and not evenly: the least ratio of three attempts counts.
+    Other processes slow down memory and caches, and not evenly: the least ratio of three attempts counts. Only attempts
+    after the first one need a reading beside them.
     """
     ratio = math.inf
-    for _ in range(ATTEMPTS):
-        _, unit = processor_time(lambda: load_scenario(_content()))
+    for attempt in range(ATTEMPTS):
+        unit = processor_time(lambda: load_scenario(_content()))[1] if attempt else _first_unit()
         result, spent = processor_time(work)
         ratio = min(ratio, spent / unit)
         if ratio < readings:
