@@ -93,22 +93,30 @@ def bits(found: Detections) -> tuple[Any, ...]:
     return (found.time, found.classes, found.tracks, *(array.tobytes() for array in arrays))
 
 
-@pytest.mark.exhaustive
-@pytest.mark.parametrize("size", [1, 4, 100])
-def test_fuse_batch_equals_separate_calls(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(covariance_intersection, "_BATCH", size)
+def methods() -> list[CovarianceIntersectionFusion]:
+    """Return new methods of 48 stations with three sets of settings."""
     settings = [
         CovarianceIntersectionSettings(),
         CovarianceIntersectionSettings(existence=0.0),
         CovarianceIntersectionSettings(gate=0.9, max_age=0.5),
     ]
+    return [CovarianceIntersectionFusion(settings[number // 4 % 3]) for number in range(48)]
 
-    def methods() -> list[CovarianceIntersectionFusion]:
-        return [CovarianceIntersectionFusion(settings[number // 4 % 3]) for number in range(48)]
 
-    expected = drive(methods(), separately)
-    found = drive(methods(), CovarianceIntersectionFusion.fuse_batch)
-    assert [list(map(bits, tick)) for tick in found] == [list(map(bits, tick)) for tick in expected]
+@pytest.fixture(scope="module")
+def expected() -> list[list[Detections]]:
+    """Return the objects of a separate call for each method in each tick."""
+    return drive(methods(), separately)
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("size", [1, 4, 100])
+def test_fuse_batch_equals_separate_calls(
+    size: int, expected: list[list[Detections]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(covariance_intersection, "_BATCH", size)
+    fused = drive(methods(), CovarianceIntersectionFusion.fuse_batch)
+    assert [list(map(bits, tick)) for tick in fused] == [list(map(bits, tick)) for tick in expected]
     assert max(len(one) for tick in expected for one in tick) > 15
     assert any(np.isnan(one.velocity).any() for tick in expected for one in tick)
 

@@ -16,12 +16,22 @@ def searched(
     seed: int, runs: int, rate_at: object, *, low: float = 0.0, high: float = 1.0, bound: float = 0.5
 ) -> Boundary:
     """Return the estimate after runs whose success rate is `rate_at(x)`."""
+    return estimates_after(seed, (runs,), rate_at, low=low, high=high, bound=bound)[0]
+
+
+def estimates_after(
+    seed: int, numbers: tuple[int, ...], rate_at: object, *, low: float = 0.0, high: float = 1.0, bound: float = 0.5
+) -> list[Boundary]:
+    """Return the estimates of one search after each of these numbers of runs, in ascending order."""
     assert callable(rate_at)
     rng, search = generator(seed, "boundary"), BoundarySearch(low, high, bound)
-    while search.runs < runs:
-        for x in search.proposals(8):
-            search.add(x, bool(rng.random() < rate_at(x)))
-    return search.estimate()
+    estimates = []
+    for runs in numbers:
+        while search.runs < runs:
+            for x in search.proposals(8):
+                search.add(x, bool(rng.random() < rate_at(x)))
+        estimates.append(search.estimate())
+    return estimates
 
 
 def falling(x: float) -> float:
@@ -29,19 +39,26 @@ def falling(x: float) -> float:
     return float(expit(-(x - 0.37) / 0.05))
 
 
+@pytest.fixture(scope="module")
+def estimates() -> list[tuple[Boundary, Boundary]]:
+    """Return the estimates of 30 searches on the falling curve after 40 and 80 runs."""
+    return [(early, late) for early, late in (estimates_after(seed, (40, 80), falling) for seed in range(30))]
+
+
 @pytest.mark.statistical
-@pytest.mark.parametrize(("runs", "error"), [(40, 0.0267), (80, 0.0172)])
-def test_error_is_at_most_that_of_probabilistic_bisection(runs: int, error: float) -> None:
+@pytest.mark.parametrize(("stage", "error"), [(0, 0.0267), (1, 0.0172)], ids=["40 runs", "80 runs"])
+def test_error_is_at_most_that_of_probabilistic_bisection(
+    estimates: list[tuple[Boundary, Boundary]], stage: int, error: float
+) -> None:
     """Root mean square errors of probabilistic bisection on the same curve, from 400 repetitions in other code."""
-    found = [searched(seed, runs, falling).value - 0.37 for seed in range(30)]
-    assert math.sqrt(np.mean(np.square(found))) <= 1.25 * error
+    errors = [search[stage].value - 0.37 for search in estimates]
+    assert math.sqrt(np.mean(np.square(errors))) <= 1.25 * error
 
 
 @pytest.mark.statistical
-def test_interval_covers_boundary() -> None:
+def test_interval_covers_boundary(estimates: list[tuple[Boundary, Boundary]]) -> None:
     """30 searches of 80 runs: 95 % credible intervals contain the boundary in at least 85 % of them."""
-    found = [searched(seed, 80, falling) for seed in range(100, 130)]
-    assert np.mean([one.low <= 0.37 <= one.high for one in found]) >= 0.85
+    assert np.mean([late.low <= 0.37 <= late.high for _, late in estimates]) >= 0.85
 
 
 @pytest.mark.statistical
