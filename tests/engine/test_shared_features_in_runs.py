@@ -72,8 +72,17 @@ def encoded_lengths(monkeypatch: pytest.MonkeyPatch) -> dict[tuple[str, int], in
     return lengths
 
 
-@pytest.mark.parametrize("channel", CHANNELS)
-@pytest.mark.parametrize("fusion", ["covariance_intersection", "early", "where2comm"])
+@pytest.mark.parametrize(
+    ("fusion", "channel"),
+    [
+        *(("where2comm", channel) for channel in CHANNELS),
+        *(
+            (fusion, channel)
+            for fusion in ("covariance_intersection", "early")
+            for channel in ("ideal", "80211p_urban")
+        ),
+    ],
+)
 def test_bytes_on_the_channel_are_those_of_the_encoded_messages(
     fusion: str, channel: str, tmp_path: Path, encoded_lengths: dict[tuple[str, int], int]
 ) -> None:

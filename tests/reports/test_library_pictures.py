@@ -70,12 +70,12 @@ def test_page_escapes_bars_of_tables() -> None:
 
 @pytest.mark.exhaustive
 def test_command_draws_selected_scenarios(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["pipeline/scenario_1", "--root", str(tmp_path)]) == 0
+    assert main(["coop/scenario_1", "--root", str(tmp_path)]) == 0
     (path,) = (tmp_path / "docs" / "library").iterdir()
     image = cv2.imread(str(path))
     assert image is not None
     assert image.shape == (300, 480, 3)
-    assert "pipeline/scenario_1" in (tmp_path / PAGE).read_text(encoding="utf-8")
+    assert "coop/scenario_1" in (tmp_path / PAGE).read_text(encoding="utf-8")
     (tmp_path / "file").touch()
-    assert main(["pipeline/scenario_1", "--root", str(tmp_path / "file")]) == 2
+    assert main(["coop/scenario_1", "--root", str(tmp_path / "file")]) == 2
     assert "file" in capsys.readouterr().err

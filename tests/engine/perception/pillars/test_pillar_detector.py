@@ -243,7 +243,7 @@ def test_tracker_begins_with_measured_velocity(tmp_path: Path) -> None:
 
 
 def test_stated_deviation_of_velocities_is_that_of_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of each axis, within a factor of two: 500 detections of moving, and 580 of standing vehicles."""
+    """Of each axis, within a factor of two: 250 detections of moving, and 290 of standing vehicles."""
     detect, detected = PillarDetector.detect, list[Detections]()
 
     def recorded(detector: PillarDetector, given: Readings) -> Detections:
@@ -252,7 +252,7 @@ def test_stated_deviation_of_velocities_is_that_of_runs(monkeypatch: pytest.Monk
 
     monkeypatch.setattr(PillarDetector, "detect", recorded)
     errors: dict[bool, list[Array]] = {True: [], False: []}
-    for number in (5, 6, 7, 8):
+    for number in (5, 7):
         detected.clear()
         collector = FrameCollector()
         simulate(resolve_scenario(f"coop/scenario_{number}"), "ideal", collector, detector="pillars", time_limit=3.0)
