@@ -6,7 +6,9 @@ Pytest sessions within tests redirect the stacks of faulthandler to files that n
 from __future__ import annotations
 
 import faulthandler
+import gc
 import os
+from collections.abc import Iterator
 
 import pytest
 
@@ -23,6 +25,17 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     """Write the stack of a crash to the error output of the session again."""
     if item.config.pluginmanager.has_plugin("faulthandler"):
         faulthandler.enable(file=item.config.stash[_ERROR_OUTPUT])
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Collect no garbage while the modules of the tests are loaded, and never look for it among them."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+        gc.freeze()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
