@@ -46,7 +46,7 @@ def braking_time(name: str, **parameters: str) -> float:
 )
 @pytest.mark.parametrize("participants", ["none", "vehicle", "rsu", "both"])
 def test_any_participant_avoids_the_collision(name: str, speeds: dict[str, object], participants: str) -> None:
-    result = play(name, Participants=participants, **speeds)
+    result = play(name, 1, Participants=participants, **speeds)
     assert failed(result) == (["collision", "reach_position"] if participants == "none" else [])
     assert not result.warnings
 

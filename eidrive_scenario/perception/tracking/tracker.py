@@ -176,7 +176,7 @@ class Tracker(TrackingMethod):
                 # It says that the object is there, and little about its place: as much as a box at the limit of the
                 # gate. If it said nothing, a track that falls behind its object would stay there.
                 offset = detections.boxes[column, :2] - expected.state[row, :2]
-                squared = squared_mahalanobis(offset, expected.covariance[row, :2, :2] + noise[column])[0]
+                squared = float(squared_mahalanobis(offset, expected.covariance[row, :2, :2] + noise[column])[0])
                 noise[column] += (1.0 / self._gate - 1.0 / max(squared, self._gate)) * np.outer(offset, offset)
         hit = set(rows)
         self._update_existence(expected, rows, detections, columns, noise, in_view)
