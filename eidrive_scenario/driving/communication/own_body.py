@@ -132,9 +132,9 @@ class OwnBody:
         """Return detections of another station without the ego body as that station perceives it.
 
         A camera measures the distance of a far vehicle with an error of several meters, so that the body can be
-        reported beside the outline. If no box is on the outline, the likeliest vehicle within the gate is the body,
-        unless an own detection explains it better: a station reports each object once. It remains the body for as
-        long as the station tracks it.
+        reported beside the outline, and another vehicle on it. Beside the boxes on the outline, the likeliest vehicle
+        within the gate is the body, unless an own detection explains it better: a station reports each object once. It
+        remains the body for as long as the station tracks it.
 
         state            pose of the station, whose covariance adds to that of its objects
         own              newest own detections
@@ -144,24 +144,26 @@ class OwnBody:
         if stored.trailers:
             detections = without_rows(detections, rows_on_bodies(detections, stored.trailers))
         inside = rows_on_bodies(detections, [stored.body])
-        if not inside:
-            row = self._likeliest_row(detections, station, state, own, pose_covariance)
-            inside = [] if row is None else [row]
-        if inside:
+        likeliest = self._likeliest_row(detections, inside, station, state, own, pose_covariance)
+        if likeliest is None and len(inside) == 1:
+            likeliest = inside[0]
+        if likeliest is not None or inside:
             self._reported[station] = detections.time
-            if len(inside) == 1 and detections.tracks:
-                self._tracks[station] = detections.tracks[inside[0]]
-        return without_rows(detections, inside)
+        if likeliest is not None and detections.tracks:
+            self._tracks[station] = detections.tracks[likeliest]
+        return without_rows(detections, inside if likeliest is None else {*inside, likeliest})
 
     def _likeliest_row(
         self,
         detections: Detections,
+        inside: Sequence[int],
         station: str,
         state: StationState | None,
         own: Detections | None,
         pose_covariance: Array | None,
     ) -> int | None:
-        """Return the row of the likeliest object within the gate, or None."""
+        """Return the row of the likeliest object within the gate, or None; own detections do not explain objects
+        `inside` the outline, which are not kept in any case."""
         track = self._tracks.get(station)
         is_repeated = detections.time - self._reported.get(station, -math.inf) <= REPEATED
         body: Array | None = None
@@ -185,7 +187,7 @@ class OwnBody:
             is_wide = detections.tracks[row] == track if detections.tracks else is_repeated
             if distance > (UNASSIGNED_GATE if is_wide else GATE.chi_square) or (best is not None and cost >= best[0]):
                 continue
-            if not _explained(position, covariance, detections.time, cost, own):
+            if row in inside or not _explained(position, covariance, detections.time, cost, own):
                 best = cost, row
         return None if best is None else best[1]
 

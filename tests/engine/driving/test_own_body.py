@@ -72,6 +72,14 @@ def test_station_reports_the_body_once(car: ActorSpec) -> None:
     assert kept(body(car), seen((9.0, 0.0), (0.5, 0.2))) == [(9.0, 0.0)]
 
 
+def test_body_beside_the_outline_is_found_with_another_vehicle_on_it(car: ActorSpec) -> None:
+    """With a standard deviation of 0.7 m in each axis the squared distances are 11.0 at the front left corner of the
+    outline and 8.8 beside it, within the gate of 9.21. No vehicle can be on the outline either."""
+    vague = np.diag([0.25, 0.25])
+    report = seen((2.2, 0.8), (0.0, -2.1), covariance=vague)
+    assert kept(body(car), report, pose_covariance=np.diag([0.25, 0.25, 1e-4])) == []
+
+
 @pytest.mark.parametrize("kind", ["pedestrian", "bicycle", "motorbike"])
 def test_vulnerable_road_users_are_not_the_body_of_a_car(car: ActorSpec, kind: str) -> None:
     assert kept(body(car), seen((6.0, 0.0), kind=kind)) == [(6.0, 0.0)]
