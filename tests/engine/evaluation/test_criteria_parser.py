@@ -110,6 +110,15 @@ def test_parse_criteria_reports_every_error_with_its_line() -> None:
     ]
 
 
+@pytest.mark.parametrize(("key", "value"), [("off", "False"), ("1", "1")])
+def test_key_that_yaml_reads_as_a_value_is_an_error(key: str, value: str) -> None:
+    """YAML 1.1 reads off, on, yes and no as Booleans."""
+    assert (
+        f"a.xosc:10: criterion 'driven_distance': the name of a setting is {value}; put it in quotes: YAML reads on, "
+        "off, yes, no and numbers as values"
+    ) in diagnostics(f"driven_distance: {{of: Ego, {key}: 5}}")
+
+
 def test_criterion_that_requires_roads_is_an_error_without_them(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Registry, "load", load_unnamed)
     monkeypatch.setattr(Unnamed, "needs_roads", True)
