@@ -144,7 +144,9 @@ class OwnBody:
         if stored.trailers:
             detections = without_rows(detections, rows_on_bodies(detections, stored.trailers))
         inside = rows_on_bodies(detections, [stored.body])
-        likeliest = self._likeliest_row(detections, inside, station, state, own, pose_covariance)
+        likeliest: int | None = None
+        if not inside or not _is_precise(detections, inside[0], state, pose_covariance):
+            likeliest = self._likeliest_row(detections, inside, station, state, own, pose_covariance)
         if likeliest is None and len(inside) == 1:
             likeliest = inside[0]
         if likeliest is not None or inside:
@@ -173,14 +175,11 @@ class OwnBody:
             category = self._spec.category
             if kind != category and (category == "misc" or (kind in VULNERABLE) is not (category in VULNERABLE)):
                 continue
-            covariance = detections.covariance[row]
-            if not math.isfinite(covariance[0, 0]):
+            if not math.isfinite(detections.covariance[row, 0, 0]):
                 continue
             if body is None:
                 body = np.array(self.at(detections.time).body[:2])
-            if state is not None and state.pose_covariance is not None:
-                point = detections.boxes[row : row + 1, :2]
-                covariance = covariance + pose_part(point, state.x, state.y, state.pose_covariance)[0]
+            covariance = _position_covariance(detections, row, state)
             position = detections.boxes[row, :2]
             spread = covariance if pose_covariance is None else covariance + pose_covariance[:2, :2]
             distance, cost = _squared_mahalanobis(position - body, spread)
@@ -190,6 +189,23 @@ class OwnBody:
             if row in inside or not _explained(position, covariance, detections.time, cost, own):
                 best = cost, row
         return None if best is None else best[1]
+
+
+def _position_covariance(detections: Detections, row: int, state: StationState | None) -> Array:
+    """Return the covariance (2, 2) of the position of an object, with that of the pose of its station."""
+    covariance: Array = detections.covariance[row]
+    if state is not None and state.pose_covariance is not None:
+        point = detections.boxes[row : row + 1, :2]
+        covariance = covariance + pose_part(point, state.x, state.y, state.pose_covariance)[0]
+    return covariance
+
+
+def _is_precise(detections: Detections, row: int, state: StationState | None, pose_covariance: Array | None) -> bool:
+    """Return whether errors within the gate are below the margin of the outline: the body is reported on it then."""
+    variance = float(np.trace(_position_covariance(detections, row, state)))
+    if pose_covariance is not None:
+        variance += float(np.trace(pose_covariance[:2, :2]))
+    return GATE.chi_square * variance < BODY_MARGIN**2
 
 
 def _explained(position: Array, covariance: Array, time: float, cost: float, own: Detections | None) -> bool:
