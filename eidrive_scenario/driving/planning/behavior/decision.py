@@ -429,12 +429,16 @@ class Decider:
         # A gentle motion through another lane would take too long.
         follows = number == 0 and profile.side == 0 and len(scene) > 0
         here = (self._body.front, situation.s, situation.speed)
-        reasons = [f"give way to {situation.kind_of(owner)}" for owner in scene.owner]
+        crossing = course.conflicts
+        reasons = {
+            conflict.hypothesis: f"give way to {situation.kind_of(scene.owner[conflict.hypothesis])}"
+            for conflict in crossing
+        }
         reactions: dict[Precedence, tuple[list[Wall], Bools]] = {}
         options: list[Option] = []
         for proposal in proposals_for(
             number,
-            course.conflicts,
+            crossing,
             settings,
             emergency=self._emergency,
             gives_up=profile.gives_up,
@@ -443,9 +447,8 @@ class Decider:
         ):
             kind = proposal.precedence
             if kind not in reactions:
-                yields = crossing_walls(course.conflicts, self._times, here, kind, reasons)
-                leads = leading(scene, course.way, course.conflicts, situation.center, kind)
-                reactions[kind] = [*course.holds, *yields, *situation.stops], leads
+                walls = [*course.holds, *crossing_walls(crossing, self._times, here, kind, reasons), *situation.stops]
+                reactions[kind] = walls, leading(scene, course.way, crossing, situation.center, kind)
             walls, leads = reactions[kind]
             time_gap = MERGING_TIME_GAP if merges else self._time_gap.value
             if is_passing and not (leads & (scene.speed > ONCOMING_SPEED)).any():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
 
 import msgspec
@@ -372,11 +372,16 @@ def conflicts(scene: Surroundings, way: Bools, here: float) -> list[Conflict]:
 
 
 def crossing_walls(
-    conflicts: list[Conflict], times: Array, ego: tuple[float, float, float], precedence: Precedence, reasons: list[str]
+    conflicts: list[Conflict],
+    times: Array,
+    ego: tuple[float, float, float],
+    precedence: Precedence,
+    reasons: Mapping[int, str],
 ) -> list[Wall]:
     """Return the walls before the zones of crossing objects to which a proposal gives way.
 
-    ego  distance of the front from the reference point [m], current distance along the line [m], speed [m/s]
+    ego      distance of the front from the reference point [m], current distance along the line [m], speed [m/s]
+    reasons  of the walls, by hypothesis
     """
     front, s, speed = ego
     walls = []
