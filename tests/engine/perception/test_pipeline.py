@@ -59,14 +59,14 @@ def test_perceive_with_latency_between_ticks_returns_at_later_tick() -> None:
 @pytest.mark.parametrize("pose_is_exact", [True, False])
 @pytest.mark.parametrize("kind", ["cv", "ctrv"])
 def test_tracker_weighs_velocities_by_the_deviation_of_the_detector(kind: Any, pose_is_exact: bool) -> None:
-    """The detector states 10 m/s of boxes that move by 6 m/s; from the third one on the boxes disprove any of it."""
+    """The detector states 10 m/s of boxes that move by 6 m/s. The first boxes do not disprove that, further ones do."""
 
-    def speed(deviation: float) -> float:
+    def speed(deviation: float, scans: int = 2) -> float:
         detector = OracleDetector()
         detector.velocity_deviation = deviation
         noise = None if pose_is_exact else PoseNoiseProcess(PoseNoise(position=1e-6), "Ego", 1)
         perception = Perception(detector, tracker=Tracker(TrackerSettings(kind=kind)), pose_noise=noise)
-        for tick in range(2):
+        for tick in range(scans):
             given = perception.locate(readings(tick * DT, 6.0 * tick * DT))
             found = perception.perceive(given)
         assert found is not None
@@ -74,6 +74,7 @@ def test_tracker_weighs_velocities_by_the_deviation_of_the_detector(kind: Any, p
 
     assert speed(0.01) == pytest.approx(10.0, abs=0.5)
     assert speed(50.0) == pytest.approx(6.0, abs=0.5)
+    assert speed(0.01, scans=8) == pytest.approx(6.0, abs=0.5)
 
 
 def test_perceive_without_due_sensor_returns_none() -> None:
