@@ -116,10 +116,8 @@ def _diagnostic(
         hint = suggestion("", _tags(model, loc, key))
         return Diagnostic(f"setting {path + '.' + key!r} is missing", hint, source, key_line)
     if kind == "invalid_key":
-        message = f"the name of a setting is {quoted(detail['input'])}"
-        return Diagnostic(
-            message, "put it in quotes: YAML reads on, off, yes, no and numbers as values", source, key_line
-        )
+        hint = "put it in quotes: YAML reads on, off, yes, no and numbers as values"
+        return Diagnostic(f"the name of a setting is {quoted(detail['input'])}", hint, source, key_line)
     message = f"setting {path!r} is {quoted(detail['input'])}"
     if kind in _COLLECTIONS:
         return Diagnostic(message, _COLLECTIONS[kind], source, key_line)
