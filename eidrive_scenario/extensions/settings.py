@@ -115,7 +115,7 @@ def _diagnostic(
         key = detail["ctx"]["discriminator"].strip("'")
         hint = suggestion("", _tags(model, loc, key))
         return Diagnostic(f"setting {path + '.' + key!r} is missing", hint, source, key_line)
-    if kind == "invalid_key":
+    if kind == "invalid_key" or loc[-1:] == ("[key]",):
         hint = "put it in quotes: YAML reads on, off, yes, no and numbers as values"
         return Diagnostic(f"the name of a setting is {quoted(detail['input'])}", hint, source, key_line)
     message = f"setting {path!r} is {quoted(detail['input'])}"

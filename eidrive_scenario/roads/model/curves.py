@@ -10,7 +10,8 @@ import math
 from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -77,12 +78,14 @@ lose precision.
 
 STANDSTILL = 1e-9
 """Maximum path length per unit of the parameter of a cubic at which it has no direction, and no curvature."""
-MIN_CUBICS = 16
-"""Minimum number of cubics that replace one curve, so that a short curve with a large bend keeps its shape."""
-UNIFORM = 1e-4
-"""Maximum distance along a curve by which a parameter that is proportional to s may be wrong [m]."""
-MAX_CUBICS = 20_000
-"""Maximum number of cubics that replace one curve. Cubics of a longer curve are longer than a meter."""
+MOST_CUBICS = 16, 16_384
+"""Maximum numbers of cubics that replace one curve: of a short one, and of any. Between them they are about a meter
+long. Both are powers of two."""
+MAX_ERROR = 1e-5
+"""Maximum distance of such a cubic from the curve [m]: its curvature is the second derivative, and right to about
+0.001/m with cubics of 2 m."""
+BETWEEN = np.array([0.25, 0.5, 0.75])
+"""Shares of a cubic at which its error is measured: in the middle alone it vanishes where the curve is symmetric."""
 
 
 Coefficients = tuple[float, float, float, float]
@@ -238,64 +241,77 @@ def param_poly3(
     return _over_arc_length(Cubic(s, x, y, h, length, u, v, line=line), 1.0)
 
 
+@cache
+def _quadrature() -> tuple[Array, Array]:
+    """Return nodes and weights of the Gauss-Legendre quadrature with five points."""
+    nodes, weights = np.polynomial.legendre.leggauss(5)
+    return nodes, weights
+
+
 def _over_arc_length(curve: Cubic, end: float, arc_length: float | None = None) -> list[Cubic]:
     """Return a curve u(p), v(p) as cubics over s, which is proportional to the arc length.
 
     The arc length is integrated by Gauss-Legendre quadrature. Each cubic has the points and tangents of the curve at
-    both ends (Hermite), so that the error decreases with the fourth power of its length and is far below a millimeter.
+    both ends (Hermite). Their number is doubled until the error is at most `MAX_ERROR`.
 
     end         maximum of the parameter p
     arc_length  length of the curve [m]; without it the curve extends to `end`
     """
-    u, v = (np.polynomial.Polynomial(coefficients) for coefficients in (curve.u, curve.v))
-    du, dv = u.deriv(), v.deriv()
+    u0, u1, u2, u3 = curve.u
+    v0, v1, v2, v3 = curve.v
 
-    def speed(p: Array) -> Array:
-        return np.asarray(np.hypot(du(p), dv(p)))
+    def tangent(p: Array) -> tuple[Array, Array, Array]:
+        """Return the derivatives of u and v by the parameter, and their norm."""
+        du, dv = u1 + p * (2.0 * u2 + 3.0 * p * u3), v1 + p * (2.0 * v2 + 3.0 * p * v3)
+        return du, dv, np.hypot(du, dv)
 
-    nodes, weights = np.polynomial.legendre.leggauss(5)
-    count = min(max(math.ceil(curve.length), MIN_CUBICS), MAX_CUBICS)
-    edges = np.linspace(0.0, end, count * 4 + 1)
+    nodes, weights = _quadrature()
+    most = 2 ** math.ceil(math.log2(min(max(curve.length, MOST_CUBICS[0]), MOST_CUBICS[1])))
+    edges = np.linspace(0.0, end, most * 4 + 1)
     half = 0.5 * np.diff(edges)
     middle = 0.5 * (edges[1:] + edges[:-1])
-    arc = np.concatenate([[0.0], np.cumsum(half * (speed(middle[:, None] + half[:, None] * nodes) @ weights))])
-    if arc_length is None and float(np.abs(arc - edges * (arc[-1] / end)).max()) < UNIFORM:
-        return [replace(curve, u=_stretched(curve.u, end / curve.length), v=_stretched(curve.v, end / curve.length))]
-    knots = np.linspace(0.0, float(arc[-1]) if arc_length is None else arc_length, count + 1)
+    arc = np.concatenate([[0.0], np.cumsum(half * (tangent(middle[:, None] + half[:, None] * nodes)[2] @ weights))])
+    total = float(arc[-1]) if arc_length is None else arc_length
+    knots = np.linspace(0.0, total, most * 4 + 1)
+    # The parameter at the knots, by Newton's method within the cells of the quadrature
     cell = np.clip(np.searchsorted(arc, knots, side="right") - 1, 0, len(half) - 1)
     p = np.interp(knots, arc, edges)
     for _ in range(3):
         reach = 0.5 * (p - edges[cell])
-        inner = speed(edges[cell, None] + reach[:, None] * (nodes + 1.0)) @ weights
-        p = p - (arc[cell] + reach * inner - knots) / np.maximum(speed(p), STANDSTILL)
+        inner = tangent(edges[cell, None] + reach[:, None] * (nodes + 1.0))[2] @ weights
+        p = p - (arc[cell] + reach * inner - knots) / np.maximum(tangent(p)[2], STANDSTILL)
         p = np.clip(p, edges[cell], edges[cell + 1])
-    step = curve.length / count
-    rate = knots[-1] / curve.length / np.maximum(speed(p), STANDSTILL)
-    ends_u, ends_v = (u(p), du(p) * rate), (v(p), dv(p) * rate)
+    du, dv, speed = tangent(p)
+    rate = total / curve.length / np.maximum(speed, STANDSTILL)
+    points = u0 + p * (u1 + p * (u2 + p * u3)), v0 + p * (v1 + p * (v2 + p * v3))
+    count = 1
+    while True:
+        stride, step = most * 4 // count, curve.length / count
+        powers = (step * BETWEEN) ** np.arange(4)[:, None]
+        parts = [
+            _hermite(value[::stride], slope[::stride], step)
+            for value, slope in zip(points, (du * rate, dv * rate), strict=True)
+        ]
+        errors = [
+            part @ powers - value[:-1].reshape(count, 4, -1)[:, 1:, 0]
+            for part, value in zip(parts, points, strict=True)
+        ]
+        if count == most or float(np.hypot(*errors).max()) <= MAX_ERROR:
+            break
+        count *= 2
+    start = curve.x, curve.y, curve.h
     return [
-        replace(
-            curve,
-            s=curve.s + i * step,
-            length=step,
-            u=_hermite(*ends_u, i, step),
-            v=_hermite(*ends_v, i, step),
-        )
-        for i in range(count)
+        Cubic(curve.s + i * step, *start, step, tuple(along), tuple(across), line=curve.line)
+        for i, (along, across) in enumerate(zip(*(part.tolist() for part in parts), strict=True))
     ]
 
 
-def _stretched(polynomial: Coefficients, pace: float) -> Coefficients:
-    """Return the polynomial of s whose value at s is that of the given one at pace·s."""
-    a, b, c, d = polynomial
-    return a, b * pace, c * pace**2, d * pace**3
-
-
-def _hermite(value: Array, slope: Array, i: int, step: float) -> Coefficients:
-    """Return the coefficients of the cubic with the given values and slopes at knots i and i + 1, `step` apart."""
-    rise = (value[i + 1] - value[i]) / step
-    c = (3.0 * rise - 2.0 * slope[i] - slope[i + 1]) / step
-    d = (slope[i] + slope[i + 1] - 2.0 * rise) / (step * step)
-    return float(value[i]), float(slope[i]), float(c), float(d)
+def _hermite(value: Array, slope: Array, step: float) -> Array:
+    """Return the coefficients (N, 4) of cubics with given values and slopes (N + 1,) at their ends, `step` apart."""
+    rise = np.diff(value) / step
+    c = (3.0 * rise - 2.0 * slope[:-1] - slope[1:]) / step
+    d = (slope[:-1] + slope[1:] - 2.0 * rise) / (step * step)
+    return np.column_stack([value[:-1], slope[:-1], c, d])
 
 
 class ReferenceLine:

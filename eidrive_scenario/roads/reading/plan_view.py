@@ -18,10 +18,10 @@ from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
 KINDS = ("line", "arc", "spiral", "poly3", "paramPoly3")
 LONGEST = 1e6
 """Maximum length of a road or geometry [m]."""
-LONGEST_POLY3 = 2e5
-"""Maximum length of all poly3 and normalized paramPoly3 of a file [m], as each meter takes memory; curves whose
-parameter is proportional to their arc length do not count."""
-POLYNOMIAL_METERS = "meters of poly3 and normalized paramPoly3"
+MAX_CUBICS = 200_000
+"""Maximum number of cubics over arc length that replace all poly3 and normalized paramPoly3 of a file, as each takes
+memory."""
+CUBICS = "parts of poly3 and normalized paramPoly3"
 SHORTEST = 1e-9
 """Maximum length of a geometry that is omitted [m]. Geometries of length 0 occur in real maps."""
 
@@ -107,14 +107,13 @@ def _read_cubic(
         message = f"a geometry of road {road_id!r} leads {away:g} m away from its start"
         collector.report_error(geometry, message, f"at most {MAX_SHAPE:g} m are read")
         return [cubic]
-    if span == "arcLength" or collector.has_spent(POLYNOMIAL_METERS, LONGEST_POLY3):
+    if span == "arcLength" or collector.has_spent(CUBICS, MAX_CUBICS):
         return [cubic]
     if span == "normalized":
         converted = curves.param_poly3(s, x, y, h, length, u, v, line)
     else:
         converted = curves.poly3(s, x, y, h, length, v, line)
-    if len(converted) > 1:
-        collector.spend(geometry, POLYNOMIAL_METERS, length, LONGEST_POLY3)
+    collector.spend(geometry, CUBICS, len(converted), MAX_CUBICS)
     return converted
 
 
