@@ -22,6 +22,7 @@ from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT
 from eidrive_scenario.driving.planning.behavior.merging import (
     MERGING_TIME_GAP,
     TimeGap,
+    TrafficBehind,
     costs_of_waiting,
     gap_leader,
     has_gap_now,
@@ -168,9 +169,14 @@ class Course(msgspec.Struct, frozen=True):
 
 
 class Decider:
-    """Decisions of one vehicle; it keeps the current maneuver."""
+    """Decisions of one vehicle; it keeps the current maneuver.
 
-    def __init__(self, settings: BehaviorSettings, spec: ActorSpec, body: Body, times: Array, view: float) -> None:
+    view  distances ahead of and behind the reference point up to which a car is in view [m]
+    """
+
+    def __init__(
+        self, settings: BehaviorSettings, spec: ActorSpec, body: Body, times: Array, view: tuple[float, float]
+    ) -> None:
         self._settings = settings
         self._times = times
         self._roller = Roller(settings, times, spec.max_acceleration)
@@ -183,7 +189,8 @@ class Decider:
         self._challenger: tuple[str, float] = (ROUTE, math.inf)
         """Another maneuver than the current one that has been best, and the time since when [s]."""
         self._time_gap = TimeGap(settings)
-        self._oncoming = OncomingTraffic(view, times, body, settings)
+        self._oncoming = OncomingTraffic(view[0], times, body, settings)
+        self._behind = TrafficBehind(view[1], body, settings)
         self._walking_pace = WalkingPace(settings, len(times))
         self._held_up = False
         self._passes = False
@@ -227,6 +234,9 @@ class Decider:
             scene = with_followers(scene, change.offset, situation.motion, self._body)
         elif change is not None and (motion := self._required_change(situation, scene, change)) is not None:
             profiles.append(motion)
+        faster = situation.lanes_ahead.faster
+        if not math.isnan(faster):
+            self._behind.observe(scene, faster, situation.now)
         expects = self._held_up and settings.lane_changes
         options = self._options(situation, scene, profiles, with_maneuvers=expects)
         best = options.best(len(profiles))
@@ -359,7 +369,7 @@ class Decider:
     ) -> Options:
         """Return the proposals along profiles, the first of which is the current one, and along new maneuvers."""
         if with_maneuvers:
-            profiles = profiles + passing_profiles(situation, scene, has_begun=self._passes)
+            profiles = profiles + passing_profiles(situation, scene, self._behind, has_begun=self._passes)
         waiting, refused = set[int](), set[int]()
         options: list[Option] = []
         change = situation.change

@@ -14,7 +14,7 @@ from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.detections import VULNERABLE
 from eidrive_scenario.driving.planning.behavior.lane_changes import LaneChange
 from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, STILL, KnownObject
-from eidrive_scenario.driving.planning.behavior.merging import has_gap_now
+from eidrive_scenario.driving.planning.behavior.merging import TrafficBehind, has_gap_now
 from eidrive_scenario.driving.planning.behavior.prediction import NOTICEABLE, Prediction
 from eidrive_scenario.driving.planning.behavior.proposals import (
     AT_OFFSET,
@@ -288,11 +288,14 @@ class _Obstacle(NamedTuple):
         return max(hypothesis.speed for hypothesis in self.objects)
 
 
-def passing_profiles(situation: Situation, scene: Surroundings, *, has_begun: bool) -> list[LateralProfile]:
+def passing_profiles(
+    situation: Situation, scene: Surroundings, behind: TrafficBehind, *, has_begun: bool
+) -> list[LateralProfile]:
     """Return maneuvers past what holds the vehicle up, or out of the way of an oncoming vehicle in its lane.
 
     The result is empty if the vehicle queues or nothing is free beside it.
 
+    behind     traffic behind in the lane for overtaking
     has_begun  whether the vehicle passes something already; what then appears behind that is no queue
     """
     head_on = _head_on(situation, scene)
@@ -317,6 +320,8 @@ def passing_profiles(situation: Situation, scene: Surroundings, *, has_begun: bo
     last = situation.end if change is None else change.begin
     returns = situation.s < last if obstacle is None else obstacle.end < last or (change is None and not moves)
     may_change = not math.isnan(faster) and returns and not _is_shut(situation, scene, faster, blocker)
+    limit = situation.wanted if math.isnan(beside.limit) else beside.limit
+    may_change = may_change and behind.leaves_gap(limit, situation.speed, situation.now)
     if may_change and has_gap_now(scene, faster, situation.motion, situation.body):
         profiles.append(to_lane(faster, situation.start, situation.settings.lateral_acceleration))
     if obstacle is not None:

@@ -8,7 +8,8 @@ import msgspec
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools
-from eidrive_scenario.driving.planning.behavior.oncoming import STOPPING_ERROR
+from eidrive_scenario.driving.planning.behavior.memory import STILL
+from eidrive_scenario.driving.planning.behavior.oncoming import LONG, PAUSE, STOPPING_ERROR
 from eidrive_scenario.driving.planning.behavior.proposals import Body
 from eidrive_scenario.driving.planning.behavior.rollout import Rollout
 from eidrive_scenario.driving.planning.behavior.scoring import WEIGHTS
@@ -142,6 +143,46 @@ def costs_of_waiting(
     first = np.where(lasts.any(axis=1), seconds[lasts.argmax(axis=1)], seconds[-1])
     overruns = rolled.s.max(axis=1) > last + STOPPING_ERROR
     return np.asarray(WEIGHTS.stays + WEIGHTS.gap * desire * first / seconds[-1] + WEIGHTS.refused * overruns)
+
+
+class TrafficBehind:
+    """Traffic in the lane for overtaking, and what may come there from behind out of view.
+
+    view  distance behind the reference point up to which a car is in view [m]
+    """
+
+    def __init__(self, view: float, body: Body, settings: BehaviorSettings) -> None:
+        self._gap = view - body.rear
+        self._relative = REAR_RESPONSE + settings.acceleration
+        """Deceleration of traffic behind relative to the vehicle, which accelerates meanwhile [m/s²]."""
+        self._fastest = 0.0
+        self._last = -math.inf
+        """Time of the last traffic, or of the first observation [s]."""
+
+    def observe(self, scene: Surroundings, lane: float, now: float) -> None:
+        """Update by the objects in the lane whose center is at an offset [m] at `now` [s]."""
+        if math.isinf(self._last):
+            self._last = now
+        speeds = scene.speed[in_lane(scene, lane)[:, 0], 0]
+        fastest = float(speeds.max(initial=0.0))
+        if fastest > STILL:
+            self._fastest = fastest if self._is_quiet(now) else max(fastest, self._fastest)
+            self._last = now
+
+    def leaves_gap(self, limit: float, speed: float, now: float) -> bool:
+        """Return whether traffic that comes into view when the vehicle enters the lane does not have to brake hard.
+
+        It drives at the speed limit, or as fast as the traffic before it. Without any for some time none is expected.
+
+        limit, speed  speed limit, and speed of the vehicle [m/s]
+        """
+        approach = max(limit, self._fastest) - speed
+        if approach <= 0.0 or self._is_quiet(now):
+            return True
+        return self._gap >= REAR_GAP + REAR_REACTION * approach + approach**2 / (2.0 * self._relative)
+
+    def _is_quiet(self, now: float) -> bool:
+        return now - self._last > LONG * PAUSE
 
 
 class TimeGap:

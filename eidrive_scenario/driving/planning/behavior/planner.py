@@ -98,15 +98,19 @@ class BehaviorPlanner(RoutePlanner):
         """Places of the objects that are the reason of the decision [m]."""
 
     @cached_property
-    def _range(self) -> float:
-        """Distance up to which the sensors show a car ahead [m]; it is known after the constructor."""
-        ahead = [sector for sector in self.view or () if abs(sector.yaw) <= sector.half_angle]
-        farthest = max((sector.x + sector.range for sector in ahead), default=math.inf)
-        return farthest if math.isfinite(farthest) else VIEW
+    def _ranges(self) -> tuple[float, float]:
+        """Distances up to which the sensors show a car ahead and behind [m]; they are known after the constructor."""
+        if not self.view:
+            return VIEW, VIEW
+        ahead = [sector.range + sector.x for sector in self.view if abs(sector.yaw) <= sector.half_angle]
+        turned = ((sector, abs(wrap_angle(sector.yaw - math.pi))) for sector in self.view)
+        behind = [sector.range - sector.x for sector, turn in turned if turn <= sector.half_angle]
+        front, rear = max(ahead, default=VIEW), max(behind, default=0.0)
+        return front if math.isfinite(front) else VIEW, rear if math.isfinite(rear) else VIEW
 
     @cached_property
     def _decider(self) -> Decider:
-        return Decider(self.planner_settings, self.spec, self._body, self._times, self._range)
+        return Decider(self.planner_settings, self.spec, self._body, self._times, self._ranges)
 
     def observe_regions(self, regions: Sequence[PerceptionRegion]) -> None:
         self._regions = regions
@@ -198,7 +202,7 @@ class BehaviorPlanner(RoutePlanner):
             return self._limits, ""
         if self._hidden is None:
             fixed = Occluders.of_map(self.roads)
-            self._hidden = HiddenTraffic(self.planner_settings, fixed, self._body, self.view or (), self._range)
+            self._hidden = HiddenTraffic(self.planner_settings, fixed, self._body, self.view or (), self._ranges[0])
         motion = (s, max(ego.speed, 0.0), wanted)
         position: tuple[float, float, float] = tuple(ego.position.tolist())
         ways = [way for way in self._ways if not way.has_light] if self._relies_on_lights(s) else self._ways

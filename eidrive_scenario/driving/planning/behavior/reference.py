@@ -42,6 +42,8 @@ class LanesBeside(NamedTuple):
     right_edge: float = -WITHOUT_ROAD
     far_edge: float = WITHOUT_ROAD
     overtaking: int = 1
+    limit: float = math.nan
+    """Speed limit of the lane at the point [m/s]; NaN if there is none."""
     oncoming_limit: float = math.nan
     """Speed limit of the nearest lane of the opposite direction [m/s]; NaN if there is none."""
     has_solid_line: bool = False
@@ -71,6 +73,7 @@ class LanesBeside(NamedTuple):
             -self.left_edge,
             -self.far_edge,
             -self.overtaking,
+            self.limit,
             self.oncoming_limit,
             self.has_solid_line,
         )
@@ -249,12 +252,17 @@ class ReferenceLine:
             beside = _beside(mirrored, len(lanes) - 1 - own).mirrored()
         else:
             beside = _beside(lanes, own)
+        beside = beside._replace(limit=self._limit_of(location, location.lane))
         if math.isnan(beside.oncoming):
             return beside
         opposite = min(lanes, key=lambda lane: abs(lane.center - beside.oncoming))
-        limit = self._roads.speed_limit(location.road, location.s, opposite.number)
         is_solid = _has_solid_line(section, location.s, location.lane)
-        return beside._replace(oncoming_limit=math.nan if limit is None else limit, has_solid_line=is_solid)
+        return beside._replace(oncoming_limit=self._limit_of(location, opposite.number), has_solid_line=is_solid)
+
+    def _limit_of(self, location: LaneLocation, lane: int) -> float:
+        """Return the speed limit of a lane of the road at a location [m/s]; NaN if there is none."""
+        limit = None if self._roads is None else self._roads.speed_limit(location.road, location.s, lane)
+        return math.nan if limit is None else limit
 
 
 def _has_solid_line(section: LaneSection, s: float, lane: int) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -10,6 +11,7 @@ from opendrive_xml import lanes_xml, map_xml, road_xml
 from planned_drive import FRONT, LANE, KnownBox, PlannedDrive, behavior
 from signal_street import CAR
 
+from eidrive_scenario.base.coverage import ViewSector
 from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.planning.behavior.lane_changes import route_lanes
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
@@ -205,3 +207,37 @@ def test_moving_car_is_not_overtaken_on_the_right() -> None:
     run.world.close()
     assert max(abs(y - LANE) for _, y, _ in run.path) < 0.2
     assert run.speeds[-1] == pytest.approx(8.0, abs=0.3)
+
+
+def fast_traffic_after(quiet: float, view: float) -> tuple[list[float], PlannedDrive]:
+    """Drive behind a truck of 7 m/s, with sensors that show cars up to `view` [m], while cars of 19 m/s come every 4 s
+    in the other lane, up to a time [s]. Return the times at which the car is in that lane, and the drive."""
+    roads = road(2, 1600.0)
+    planner = behavior(roads, 13.9)
+    planner.view = (ViewSector(0.0, 0.0, 1.8, 0.0, math.pi, view),)
+    run = PlannedDrive(planner, roads, speed=7.0, start=200.0, y=LANE - WIDTH)
+
+    def in_view(now: float) -> list[KnownBox]:
+        x = run.path[-1][0] if run.path else 200.0
+        starts = (190.0 - 19.0 * 4.0 * number for number in range(int(quiet / 4.0)))
+        cars = [KnownBox(start + 19.0 * now, LANE, vx=19.0) for start in starts]
+        truck = KnownBox(220.0 + 7.0 * now, LANE - WIDTH, vx=7.0, kind="truck", size=(9.0, 2.5))
+        return [truck, *(car for car in cars if abs(car.x - x) < view)]
+
+    run.run(quiet + 28.0, in_view)
+    run.world.close()
+    return [0.05 * tick for tick, (_, y, _) in enumerate(run.path) if y > LANE - WIDTH / 2.0], run
+
+
+def test_vehicle_changes_lanes_only_with_a_view_of_fast_traffic() -> None:
+    """Cars of 19 m/s need 3 m + 12 m + 12² m / 9 = 31 m behind the rear to slow down to 7 m/s."""
+    times, run = fast_traffic_after(20.0, view=25.0)
+    assert run.speeds[round(18.0 / 0.05)] == pytest.approx(7.0, abs=0.5), "it follows the truck"
+    # The last car leaves the view at (200 - (190 - 76 * 4) + 25) / 12 s. It is kept for 1 s, the change is the best
+    # proposal for 0.5 s before it begins, and half of its about 4 s pass up to the border of the lane.
+    assert 28.3 + 12.0 < times[0] < 28.3 + 12.0 + 1.0 + 0.5 + 2.5, "not between cars that it does not see in time"
+
+
+def test_vehicle_with_a_view_of_fast_traffic_changes_lanes_in_a_gap() -> None:
+    times, _ = fast_traffic_after(4.0, view=60.0)
+    assert times[0] < 8.0
