@@ -121,6 +121,12 @@ class RoadNetwork:
         return all(road.elevation.is_zero and road.superelevation.is_zero for road in self.roads.values())
 
     @cached_property
+    def is_flat(self) -> bool:
+        """Whether all roads are in the plane z = 0, with all their lanes, such as sidewalks."""
+        sections = (section for road in self.roads.values() for section in road.sections)
+        return self.is_level and not any(lane.heights for section in sections for lane in section.lanes.values())
+
+    @cached_property
     def _locator(self) -> Locator:
         return Locator(self.tables)
 

@@ -164,7 +164,8 @@ class FollowTrajectoryAction(ActionBehaviour):
         spline = self._trajectory.shape.clothoid_spline
         if not present and spline is not None and spline.clothoid_spline_segment[0].position_start is None:
             raise EntityAbsentError(self.actor.name)
-        self._layout: TrajectoryCurve = sample_trajectory(self._trajectory, self._resolve_pose, motion.pose)
+        roads = self.context.roads
+        self._layout: TrajectoryCurve = sample_trajectory(self._trajectory, self._resolve_pose, motion.pose, roads)
         self._s = self._offset()
         self._progress = TrajectoryProgress(self._layout, self._s)
         self._followed = self._progress

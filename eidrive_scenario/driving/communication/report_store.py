@@ -88,6 +88,7 @@ class PartialReportAssembler:
             np.concatenate([known_object.covariance for known_object in objects]),
             tuple(self._objects),
             np.concatenate([known_object.confidence for known_object in objects]),
+            detections.velocity_deviation,
         )
 
 

@@ -56,10 +56,12 @@ class Motion(MotionState):
         self._lane_distance: float | None = None
         self._crosses = False
         self._teleport = False
+        self._stops = False
+        """Whether the actor stops in the next step, unless an action moves it."""
 
     def set_speed(self, speed: float) -> None:
         """Set the speed [m/s] from the current step on."""
-        self._speed, self._rests = speed, False
+        self._speed, self._rests, self._stops = speed, False, False
 
     def set_backing(self, backs: bool) -> None:
         """Set whether a positive speed moves the actor against its heading, as on a trajectory with such headings."""
@@ -98,7 +100,8 @@ class Motion(MotionState):
     ) -> None:
         """Set the pose at the end of the current step, independent of lanes.
 
-        land   assign the actor to the lane at this pose, which it then follows; without roads the actor stops
+        land   assign the actor to the lane at this pose, which it then follows; without roads it stops there unless an
+               action moves it on
         jump   teleport: the distance does not count as covered
         rail   returns the pose after a given distance [m]; used if `move_along_lane` sets the distance of the step
         """
@@ -156,6 +159,9 @@ class Motion(MotionState):
         lane_distance, self._lane_distance = self._lane_distance, None
         if target is not None and lane_distance is not None and self._pose_at_distance is not None:
             target = self._pose_at_distance(lane_distance)
+        if self._stops and target is None:
+            self._speed = 0.0
+        self._stops = False
         distance = self._speed * dt if lane_distance is None else lane_distance
         if self._teleport:
             self._teleport = False
@@ -171,8 +177,7 @@ class Motion(MotionState):
             self._end_of_road = False
             if self._snaps_to_lane:
                 self.snap_to_lane()
-                if self.roads is None:
-                    self._speed = 0.0
+                self._stops = self.roads is None
         elif distance == 0.0 and steering is None:
             stands = self._speed == 0.0 and math.copysign(1.0, self._speed) == 1.0
             self._rests = stands and not self._end_of_road and not self._teleported

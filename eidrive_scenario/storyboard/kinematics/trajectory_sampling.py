@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
 from typing import Literal
@@ -13,7 +14,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.roads import Pose
+from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, blend, fill_gaps
 
 SPACING = 0.1
@@ -203,14 +204,17 @@ ROUNDING = 2.0
 """Maximum distance from a corner of a polyline at which the heading turns [m]."""
 
 
-def sample_trajectory(trajectory: model.Trajectory, resolve: Resolve, start: Pose | None = None) -> TrajectoryCurve:
+def sample_trajectory(
+    trajectory: model.Trajectory, resolve: Resolve, start: Pose | None = None, roads: RoadNetwork | None = None
+) -> TrajectoryCurve:
     """Sample a trajectory in world coordinates. `resolve` returns the current pose of a position.
 
-    A clothoid spline without a start position begins at `start`.
+    A clothoid spline without a start position begins at `start`. Between positions without a specified height the
+    trajectory follows the surface of `roads`; None: it is linear there.
     """
     shape = trajectory.shape.chosen()
     if isinstance(shape, model.Polyline):
-        return _polyline(shape, trajectory.closed, resolve)
+        return _polyline(shape, trajectory.closed, resolve, roads)
     if isinstance(shape, model.Clothoid):
         curve = _clothoid(shape, trajectory.closed, resolve)
     elif isinstance(shape, model.ClothoidSpline):
@@ -218,7 +222,66 @@ def sample_trajectory(trajectory: model.Trajectory, resolve: Resolve, start: Pos
     else:
         assert isinstance(shape, model.Nurbs)
         curve = _nurbs(shape, trajectory.closed, resolve)
-    return _with_closing_line(curve) if trajectory.closed else curve
+    if trajectory.closed:
+        curve = _with_closing_line(curve)
+    positions = [part for part in shape.walk() if isinstance(part, model.Position)]
+    if roads is not None and all(_is_on_ground(position) for position in positions):
+        tilts = not any(specifies(position, "p") or specifies(position, "r") for position in positions)
+        curve = _over_roads(curve, roads, [(0.0, curve.length, tilts)])
+    return curve
+
+
+def _is_on_ground(position: model.Position) -> bool:
+    """Return whether a position is on the surface of the road, as it specifies no height."""
+    frame = position.chosen()
+    if isinstance(frame, model.TrajectoryPosition):
+        return False
+    return not any(getattr(frame, name, None) for name in ("dz", "altitude")) and not any(
+        getattr(frame, name, None) is not None for name in ("z", "height")
+    )
+
+
+SURFACE_SPACING = 1.0
+"""Maximum distance between samples of a polyline that follows the surface of a road [m]."""
+
+
+def _over_roads(
+    curve: TrajectoryCurve, roads: RoadNetwork, spans: Sequence[tuple[float, float, bool]]
+) -> TrajectoryCurve:
+    """Return a curve with the heights of the roads, where it is on some.
+
+    spans  begin and end of each part that follows the roads [m], and whether pitch and roll follow them as well
+    """
+    if roads.is_flat:
+        return curve
+    samples = list(zip(curve.s, curve.poses, strict=True))
+    if curve.stations:
+        samples = [sample for ends in pairwise(samples) for sample in _between(*ends)] + samples[-1:]
+    location: LaneLocation | None = None
+    s, poses = [place for place, _ in samples], [pose for _, pose in samples]
+    for begin, end, tilts in spans:
+        first = bisect_left(s, begin)
+        height = poses[first].z
+        for number in range(first, bisect_right(s, end)):
+            pose = poses[number]
+            # Where roads cross above each other, the surface is that near the one before.
+            location = roads.locate_at(pose.x, pose.y, location, height)
+            if location is None:
+                continue
+            surface = roads.pose(location)
+            height = surface.z
+            level = surface.turned(wrap_angle(pose.h - surface.h))
+            poses[number] = pose._replace(z=surface.z, p=level.p, r=level.r) if tilts else pose._replace(z=surface.z)
+    return replace(curve, s=tuple(s), poses=tuple(poses))
+
+
+def _between(first: tuple[float, Pose], last: tuple[float, Pose]) -> Iterator[tuple[float, Pose]]:
+    """Yield a sample of a polyline, and further ones at most SURFACE_SPACING apart up to the next one."""
+    (begin, a), (end, b) = first, last
+    count = max(1, math.ceil((end - begin) / SURFACE_SPACING))
+    for number in range(count):
+        share = number / count
+        yield begin + share * (end - begin), blend(a, b, share) if number else a
 
 
 def _with_closing_line(curve: TrajectoryCurve) -> TrajectoryCurve:
@@ -248,16 +311,23 @@ def _with_closing_line(curve: TrajectoryCurve) -> TrajectoryCurve:
 class PolylineVertex:
     """Vertex of a polyline: pose, and the heading and pitch that the file specifies [rad]; None without one.
 
-    `is_oriented` is true if the file specifies any angle.
+    is_tilted     whether the file specifies pitch or roll
+    is_on_ground  whether it specifies no height
     """
 
     pose: Pose
     h: float | None
     p: float | None
-    is_oriented: bool
+    is_tilted: bool
+    is_on_ground: bool
+
+    @property
+    def is_oriented(self) -> bool:
+        """Whether the file specifies any angle."""
+        return self.h is not None or self.is_tilted
 
 
-def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve) -> TrajectoryCurve:
+def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve, roads: RoadNetwork | None) -> TrajectoryCurve:
     vertices = [_vertex(vertex.position, resolve) for vertex in shape.vertex]
     times = [vertex.time for vertex in shape.vertex]
     first, last = vertices[0].pose, vertices[-1].pose
@@ -270,14 +340,24 @@ def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve) -> Trajecto
         times.append(
             None if instants is None or length == 0.0 else instants[-1] + gap * (instants[-1] - instants[0]) / length
         )
-    return _sampled_polyline(vertices, _times(times), closed)
+    curve = _sampled_polyline(vertices, _times(times), closed)
+    if roads is None:
+        return curve
+    pairs = zip(pairwise(curve.stations), pairwise(vertices), strict=True)
+    spans = [
+        (begin, end, not a.is_tilted and not b.is_tilted)
+        for (begin, end), (a, b) in pairs
+        if a.is_on_ground and b.is_on_ground
+    ]
+    return _over_roads(curve, roads, spans)
 
 
 def _vertex(position: model.Position, resolve: Resolve) -> PolylineVertex:
     pose = resolve(position)
     h = pose.h if specifies(position, "h") else None
     p = pose.p if specifies(position, "p") else None
-    return PolylineVertex(pose, h, p, is_oriented=h is not None or p is not None or specifies(position, "r"))
+    is_tilted = p is not None or specifies(position, "r")
+    return PolylineVertex(pose, h, p, is_tilted, _is_on_ground(position))
 
 
 def _sampled_polyline(

@@ -131,7 +131,9 @@ def trajectory_of(
 ) -> TrajectoryCurve:
     """Return the trajectory of a position, with its points resolved at this instant."""
     trajectory = _trajectory_element(frame, context)
-    return sample_trajectory(trajectory, lambda position: resolve_position(position, context, actor).pose)
+    return sample_trajectory(
+        trajectory, lambda position: resolve_position(position, context, actor).pose, roads=context.roads
+    )
 
 
 def _trajectory_element(frame: model.TrajectoryPosition, context: ConditionContext) -> model.Trajectory:

@@ -30,6 +30,18 @@ def test_motion_without_roads_is_straight() -> None:
     assert (placement.x, placement.y, placement.z) == pytest.approx((1.0, 3.0, 0.5))
 
 
+def test_actor_without_roads_stops_after_a_trajectory_unless_another_one_follows() -> None:
+    motion = Motion(None)
+    motion.set_speed(10.0)
+    speeds = []
+    for x, is_end in ((1.0, True), (2.0, False), (3.0, True)):
+        motion.move_to(Pose(x, 0.0, 0.0, 0.0, 0.0, 0.0), land=is_end)
+        speeds.append(motion.step(0.1).speed)
+    assert speeds == [10.0, 10.0, 10.0]
+    standing = motion.step(0.1)
+    assert (standing.x, standing.speed) == (3.0, 0.0)
+
+
 def test_teleported_actor_is_at_its_position_in_the_next_view() -> None:
     motion = Motion(None)
     motion.teleport(ResolvedPosition(Pose(1.0, 2.0, 0.0, 0.0, 0.0, 0.0)))

@@ -7,10 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from opendrive_xml import elevation_xml, lane_xml, map_xml, road_xml, section_xml
 from processor_time import within_readings
 
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.roads import Pose
+from eidrive_scenario.roads import Pose, RoadNetwork
 from eidrive_scenario.storyboard.kinematics.trajectory_sampling import sample_trajectory
 
 
@@ -383,3 +384,64 @@ def test_clothoid_on_a_slope_stays_in_its_plane() -> None:
     around = sample_trajectory(trajectory(clothoid=turn), resolve_with_pitch)
     assert around.at(around.length)[:5] == pytest.approx((0.0, 20.0, 0.0, math.pi, SLOPE), abs=1e-2)
     assert around.at(0.5 * around.length)[:5] == pytest.approx((10.0, 10.0, 5.0, math.pi / 2, 0.0), abs=1e-2)
+
+
+HILL = RoadNetwork.parse(map_xml(road_xml(length=200.0, profiles=elevation_xml(slope=0.1, curvature=-0.0005))))
+"""Road along x with the height 0.1 x - 0.0005 x²: 0 at both ends, and 5 m at its crest at x = 100 m."""
+
+
+def over_the_hill(z: float | None, p: float | None = None, h: float | None = None, **shape: Any) -> Any:
+    """Sample a trajectory on the hill from x = 0 to 200 m with the height, pitch and heading of its positions."""
+    ends = tuple(model.Position(world_position=model.WorldPosition(x=x, y=-1.75, z=z, p=p, h=h)) for x in (0.0, 200.0))
+    vertices = tuple(model.Vertex(position=end) for end in ends)
+    return sample_trajectory(
+        trajectory(**shape or {"polyline": model.Polyline(vertex=vertices)}), resolve_with_pitch, roads=HILL
+    )
+
+
+def test_polyline_without_heights_is_on_the_road() -> None:
+    way = over_the_hill(None)
+    assert [way.at(s).z for s in (0.0, 50.0, 100.0, 150.0, 200.0)] == pytest.approx([0.0, 3.75, 5.0, 3.75, 0.0])
+    assert [way.at(s).p for s in (50.0, 100.0, 150.0)] == pytest.approx([-math.atan(0.05), 0.0, math.atan(0.05)])
+    assert over_the_hill(None, h=math.pi).at(50.0).p == pytest.approx(math.atan(0.05)), "it faces against the slope"
+
+
+def test_specified_heights_and_pitches_are_kept_on_a_hill() -> None:
+    assert over_the_hill(0.0).at(100.0).z == 0.0
+    pitched = over_the_hill(None, p=0.2).at(50.0)
+    assert (pitched.z, pitched.p) == pytest.approx((3.75, 0.2))
+
+
+def test_curves_without_heights_are_on_the_road() -> None:
+    knots = tuple(model.Knot(value=value) for value in (0.0, 0.0, 0.0, 1.0, 1.0, 1.0))
+    points = tuple(model.ControlPoint(position=at(x, -1.75)) for x in (0.0, 100.0, 200.0))
+    spline = over_the_hill(None, nurbs=model.Nurbs(order=3, knot=knots, control_point=points))
+    straight = model.Clothoid(curvature=0.0, curvature_prime=0.0, length=200.0, position=at(0.0, -1.75, 0.0))
+    for way in (spline, over_the_hill(None, clothoid=straight)):
+        assert [way.at(s).z for s in (50.0, 100.0)] == pytest.approx([3.75, 5.0], abs=1e-3)
+
+
+def test_polyline_across_a_road_leaves_and_enters_the_sidewalks() -> None:
+    kerb = '<height sOffset="0" inner="0.12" outer="0.12"/>'
+    sidewalks = [lane_xml(number, 2.0, kind="sidewalk", more=kerb) for number in (2, -2)]
+    lanes = section_xml(sidewalks[0] + lane_xml(1), lane_xml(-1) + sidewalks[1])
+    roads = RoadNetwork.parse(map_xml(road_xml(lanes=lanes)))
+    ends = tuple(model.Vertex(position=at(50.0, y)) for y in (-4.5, 4.5))
+    way = sample_trajectory(
+        trajectory(polyline=model.Polyline(vertex=ends)),
+        lambda position: resolve(position)._replace(z=0.12),
+        roads=roads,
+    )
+    assert [way.at(s).z for s in (0.0, 2.0, 4.5, 7.0, 9.0)] == pytest.approx([0.12, 0.0, 0.0, 0.0, 0.12])
+
+
+def test_polyline_stays_on_a_bridge() -> None:
+    below = road_xml("2", x=100.0, y=-100.0, hdg=math.pi / 2, length=200.0)
+    bridge = road_xml(length=200.0, profiles=elevation_xml(6.0))
+    ends = tuple(model.Vertex(position=at(x, -1.75)) for x in (0.0, 200.0))
+    way = sample_trajectory(
+        trajectory(polyline=model.Polyline(vertex=ends)),
+        lambda position: resolve(position)._replace(z=6.0),
+        roads=RoadNetwork.parse(map_xml(bridge, below)),
+    )
+    assert {pose.z for pose in way.poses} == {6.0}
