@@ -189,6 +189,16 @@ def test_lateral_distance_is_reached_at_the_maximum_speed(scene: RunScene) -> No
     assert played.at(4.0).yaw == 0.0, "after the end, Ego drives along the lane"
 
 
+@pytest.mark.parametrize("continuous", ["false", "true"])
+def test_lateral_distance_without_limits_is_immediate(scene: RunScene, continuous: str) -> None:
+    """The jump takes nothing of the distance along the lane, as a step of a lane change: x = 100 + 20 t."""
+    action = f"""<PrivateAction><LateralAction><LateralDistanceAction entityRef="Other" distance="3" freespace="false"
+      continuous="{continuous}" coordinateSystem="lane" displacement="leftToReferencedEntity"/></LateralAction>
+      </PrivateAction>"""
+    played = scene(1, ("Ego", action))
+    assert (played.at(0.1).x, played.at(0.1).y, played.at(0.1).yaw) == pytest.approx((102.0, 1.0, 0.0))
+
+
 @pytest.mark.element("LateralDistanceAction")
 def test_lateral_distance_with_free_space_is_between_the_sides(scene: RunScene) -> None:
     """Two cars of 2 m width have centers 2.5 m apart. With an acceleration limit the motion is that of a spring."""

@@ -65,15 +65,15 @@ class LateralDistanceAction(ActionBehaviour):
         if math.isnan(error):
             return Status.RUNNING
         sideways = self._lateral_displacement(error, dt)
-        if self.action.dynamic_constraints is not None:
-            most = STEEPEST * abs(motion.speed) * dt
-            if abs(sideways) > most:
-                sideways = math.copysign(most, sideways)
-                self._rate = sideways / dt
+        most = STEEPEST * abs(motion.speed) * dt
+        jumps = abs(sideways) > most
+        if jumps and self.action.dynamic_constraints is not None:
+            jumps, sideways = False, math.copysign(most, sideways)
+            self._rate = sideways / dt
         offset = here.offset * roads.driving_direction(here.road, here.lane) + sideways
         ends = abs(error - sideways) < REACHED and not self.action.continuous
-        heading = 0.0 if ends or abs(motion.speed) <= STANDING else None
-        motion.set_lateral_step(LateralStep(offset, heading))
+        heading = 0.0 if ends or jumps or abs(motion.speed) <= STANDING else None
+        motion.set_lateral_step(LateralStep(offset, heading, shortens_distance=not jumps))
         return Status.SUCCESS if ends else Status.RUNNING
 
     def _lateral_displacement(self, error: float, dt: float) -> float:

@@ -136,12 +136,19 @@ class Movement:
             return branches[0].lane, branches[0].direction, 0.0
         chosen: Branch | None = None
         if route is not None:
-            chosen = route.pick(branches, road.id, visit)
+            chosen = route.pick(branches, road.id, visit) or self._towards(route, branches, visit)
         if chosen is None and choose is not None:
             chosen = choose(branches)
         if chosen is None:
             chosen = _default_branch(branches, road)
         return chosen.lane, chosen.direction, 0.0
+
+    def _towards(self, route: Route, branches: Sequence[Branch], visit: int) -> Branch | None:
+        """Return the branch that leads to a later road of a route by another way, as in a lane against the traffic."""
+        ends = [{name for name, _ in self._links.beyond_road(b.lane.road, b.direction)} for b in branches]
+        later = (name for name in route.roads_from(visit + 1) if any(name in roads for roads in ends))
+        goal = next(later, None)
+        return next((branch for branch, roads in zip(branches, ends, strict=True) if goal in roads), None)
 
     def branches(self, key: LaneKey, direction: int, with_traffic: bool = True) -> list[Branch]:
         """Return the branches at the end of a lane in the order of the file, preferably those with the traffic."""

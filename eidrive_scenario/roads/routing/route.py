@@ -268,6 +268,10 @@ class Route:
             visit %= len(self._visits)
         return self._visits[visit][0] if visit < len(self._visits) else None
 
+    def roads_from(self, visit: int) -> Iterator[str]:
+        """Yield the roads from a visit on; a closed route continues at its start."""
+        return (self._visits[number][0] for number in self._later(visit))
+
     def _later(self, visit: int) -> Iterator[int]:
         """Yield the indices of the roads from a visit on; a closed route continues at its start."""
         yield from range(visit, len(self._visits))

@@ -13,6 +13,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.base.geometry import wrap_angle
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve, blend, fill_gaps
@@ -272,6 +273,8 @@ def _over_roads(
             height = surface.z
             level = surface.turned(wrap_angle(pose.h - surface.h))
             poses[number] = pose._replace(z=surface.z, p=level.p, r=level.r) if tilts else pose._replace(z=surface.z)
+    if all(abs(pose.z - linear.z) < EPSILON for pose, (_, linear) in zip(poses, samples, strict=True)):
+        return curve
     return replace(curve, s=tuple(s), poses=tuple(poses))
 
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import pytest
 from opendrive_xml import junction_xml, lane_links_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
@@ -266,6 +267,16 @@ def test_advance_at_symmetric_fork_turns_to_the_side_of_the_traffic(
     moved = network.advance(network.location("a", -1 if rule == "RHT" else 1, 95.0), 10.0)
     assert moved is not None
     assert moved.road == expected
+
+
+@pytest.mark.parametrize(("end", "lane"), [("2", -1), ("3", -1), ("4", 1)])
+def test_advance_against_the_traffic_of_a_junction_follows_the_route(end: str, lane: int) -> None:
+    """The route leads from lane -1 of road 1 into a lane; the way from lane 1, against the traffic, has other roads."""
+    network = RoadNetwork.load(Path(__file__).parents[3] / "xosc/roads/four_way_junction.xodr")
+    route = network.route(network.location("1", -1, 50.0), network.location(end, lane, 50.0))
+    reached = network.advance(network.location("1", 1, 90.0), -100.0, route=route)
+    assert reached is not None
+    assert (reached.road, reached.lane) == (end, -lane)
 
 
 def test_advance_backwards_leaves_a_junction() -> None:
