@@ -41,6 +41,7 @@ from eidrive_scenario.storyboard.kinematics.trailers import road_train as road_t
 from eidrive_scenario.storyboard.kinematics.trailers import trailers_behind as trailers_behind
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryCurve as TrajectoryCurve
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryProgress as TrajectoryProgress
+from eidrive_scenario.storyboard.kinematics.trajectory_sampling import on_surface as on_surface
 from eidrive_scenario.storyboard.kinematics.trajectory_sampling import sample_trajectory as sample_trajectory
 from eidrive_scenario.storyboard.kinematics.transition_profile import TransitionProfile as TransitionProfile
 from eidrive_scenario.storyboard.positions.distances import closing_speed as closing_speed

@@ -6,6 +6,7 @@ import math
 from itertools import pairwise
 
 import pytest
+from opendrive_xml import elevation_xml, map_xml, road_xml
 from recorded_scene import RunScene
 from storyboard_xml import element_state_xml, init_xml, speed_xml, teleport_xml
 from street_scene import NOTHING, after
@@ -345,3 +346,17 @@ def test_actor_on_a_climbing_trajectory_is_pitched(run: Run) -> None:
     played = drive(run, teleport_xml(world(100.0, -2.0)), speed_xml(10.0), follow(way), end=8.0)
     pitches = played.of("Ego", "pitch")
     assert [pitches[round(time / 0.05)] for time in (1.0, 4.0, 8.0)] == pytest.approx([0.0, -math.atan(0.5), 0.0])
+
+
+@pytest.mark.element("FollowTrajectoryAction")
+@pytest.mark.parametrize("mode", ["position", "follow"])
+def test_actor_on_a_trajectory_over_a_hill_stays_on_the_road(run: Run, mode: str) -> None:
+    """The way begins 10 m ahead and 1 m beside the car, crosses the crest at 100 m, and ends on the slope at 180 m."""
+    hill = map_xml(road_xml(length=200.0, profiles=elevation_xml(slope=0.1, curvature=-0.0005)))
+    lane = '<LanePosition roadId="1" laneId="{}" s="{}" offset="{}"/>'
+    way = curve(lane.format(-1, 15, 1.0), lane.format(1, 100, 0), lane.format(-1, 180, 0))
+    played = run(16.0, driven=False, street=hill, ego=(-1, 5.0, 12.0), init=init_xml("Ego", follow(way, mode)))
+    for frame in played.frames:
+        x, _, z = frame.view.position[frame.view.rows["Ego"]].tolist()
+        assert z == pytest.approx(0.1 * x - 0.0005 * x * x, abs=1e-3)
+    assert x == pytest.approx(200.0, abs=5.0)

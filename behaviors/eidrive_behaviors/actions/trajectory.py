@@ -29,6 +29,7 @@ from eidrive_scenario.api.actions import (
     TrajectoryProgress,
     has_times,
     model,
+    on_surface,
     resolve_position,
     sample_trajectory,
 )
@@ -352,12 +353,23 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._s = pursuit.s
         self._progress.move(self.context.view.tick, before, pursuit.s)
         done = not layout.closed and self._leaves(before, pursuit.s)
+        if not pursuit.on_path:
+            pose = self._beside_curve(pose, layout.extended(pursuit.s))
         motion.move_to(
             pose,
             land=done,
             rail=None if self._run is not None else partial(self._pose_after_distance, before),
         )
         return Status.SUCCESS if done else Status.RUNNING
+
+    def _beside_curve(self, pose: Pose, goal: Pose) -> Pose:
+        """Return a pose beside the trajectory as far above the roads as its place on the trajectory is."""
+        roads = self.context.roads
+        if roads is None or roads.is_flat:
+            return pose
+        below, there = on_surface(goal, roads, None, goal.z)
+        level, here = on_surface(pose, roads, there, below.z)
+        return pose if here is None else level._replace(z=level.z + goal.z - below.z)
 
     def _last_speed(self) -> float:
         """Return the speed at the end of a timed trajectory [m per s of its clock]."""

@@ -22,6 +22,9 @@ from eidrive_scenario.world.actor import ActorSpec
 GATE = AssociationGate.of(0.99, 0.0)
 """Gate of the offset between a reported object and the ego body, given the covariances of both."""
 
+VELOCITY_DEVIATION = 2.0
+"""Standard deviation of a reported velocity in each axis by which objects within the gate are compared [m/s]; a choice,
+between that of trackers and of first estimates."""
 REPEATED = 1.0
 """Time for which a station that has reported the ego body is expected to report it again [s]: the longest interval
 between two reports of an object (ETSI TS 103 324, T_GenCpmMax)."""
@@ -34,6 +37,7 @@ class BodyPose(NamedTuple):
     body       outline of the body
     trailers   outlines of the trailers
     driven     length of the path of the center since the first pose [m]
+    velocity   velocity of the body [m/s]
     """
 
     time: float
@@ -41,6 +45,7 @@ class BodyPose(NamedTuple):
     body: Outline
     trailers: Sequence[Outline]
     driven: float
+    velocity: tuple[float, float]
 
 
 class OwnBody:
@@ -77,7 +82,7 @@ class OwnBody:
         if self._poses:
             last = self._poses[-1]
             driven = last.driven + math.hypot(x - last.body.x, y - last.body.y)
-        self._poses.append(BodyPose(ego.time, reference, body, trailers, driven))
+        self._poses.append(BodyPose(ego.time, reference, body, trailers, driven, (ego.speed * cos, ego.speed * sin)))
         if trailers:
             self._extent = math.inf
         self._vicinity = x, y, driven - self._poses[0].driven + self._extent
@@ -133,8 +138,8 @@ class OwnBody:
 
         A camera measures the distance of a far vehicle with an error of several meters, so that the body can be
         reported beside the outline, and another vehicle on it. Beside the boxes on the outline, the likeliest vehicle
-        within the gate is the body, unless an own detection explains it better: a station reports each object once. It
-        remains the body for as long as the station tracks it.
+        within the gate, by position and velocity, is the body, unless an own detection explains it better: a station
+        reports each object once. It remains the body for as long as the station tracks it.
 
         state            pose of the station, whose covariance adds to that of its objects
         own              newest own detections
@@ -165,7 +170,10 @@ class OwnBody:
         pose_covariance: Array | None,
     ) -> int | None:
         """Return the row of the likeliest object within the gate, or None; own detections do not explain objects
-        `inside` the outline, which are not kept in any case."""
+        `inside` the outline, which are not kept in any case.
+
+        The gate refers to positions only: the first velocities of a track may be wrong.
+        """
         track = self._tracks.get(station)
         is_repeated = detections.time - self._reported.get(station, -math.inf) <= REPEATED
         body: Array | None = None
@@ -178,16 +186,21 @@ class OwnBody:
             if not math.isfinite(detections.covariance[row, 0, 0]):
                 continue
             if body is None:
-                body = np.array(self.at(detections.time).body[:2])
+                here = self.at(detections.time)
+                body, body_velocity = np.array(here.body[:2]), np.array(here.velocity)
             covariance = _position_covariance(detections, row, state)
             position = detections.boxes[row, :2]
             spread = covariance if pose_covariance is None else covariance + pose_covariance[:2, :2]
             distance, cost = _squared_mahalanobis(position - body, spread)
             is_wide = detections.tracks[row] == track if detections.tracks else is_repeated
-            if distance > (UNASSIGNED_GATE if is_wide else GATE.chi_square) or (best is not None and cost >= best[0]):
+            if distance > (UNASSIGNED_GATE if is_wide else GATE.chi_square):
+                continue
+            vx, vy = np.nan_to_num(detections.velocity[row] - body_velocity).tolist()
+            total = cost + (vx * vx + vy * vy) / VELOCITY_DEVIATION**2
+            if best is not None and total >= best[0]:
                 continue
             if row in inside or not _explained(position, covariance, detections.time, cost, own):
-                best = cost, row
+                best = total, row
         return None if best is None else best[1]
 
 

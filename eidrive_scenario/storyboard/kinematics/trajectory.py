@@ -77,7 +77,9 @@ class TrajectoryCurve:
         if beyond == 0.0:
             return pose
         along = self.tangent(s)
-        return pose._replace(x=pose.x + beyond * math.cos(along), y=pose.y + beyond * math.sin(along))
+        (begin, first), (end, last) = [(self.s[n], self.poses[n].z) for n in ((0, 1) if beyond < 0.0 else (-2, -1))]
+        rise = beyond * (last - first) / (end - begin) if end > begin else 0.0
+        return pose._replace(x=pose.x + beyond * math.cos(along), y=pose.y + beyond * math.sin(along), z=pose.z + rise)
 
     def _wrapped(self, s: float) -> float:
         return s % self.length if self.closed and self.length > 0.0 and not 0.0 <= s <= self.length else s

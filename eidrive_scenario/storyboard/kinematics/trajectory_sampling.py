@@ -266,16 +266,29 @@ def _over_roads(
         for number in range(first, bisect_right(s, end)):
             pose = poses[number]
             # Where roads cross above each other, the surface is that near the one before.
-            location = roads.locate_at(pose.x, pose.y, location, height)
-            if location is None:
-                continue
-            surface = roads.pose(location)
-            height = surface.z
-            level = surface.turned(wrap_angle(pose.h - surface.h))
-            poses[number] = pose._replace(z=surface.z, p=level.p, r=level.r) if tilts else pose._replace(z=surface.z)
+            level, location = on_surface(pose, roads, location, height)
+            height = level.z
+            poses[number] = level if tilts else pose._replace(z=height)
     if all(abs(pose.z - linear.z) < EPSILON for pose, (_, linear) in zip(poses, samples, strict=True)):
         return curve
     return replace(curve, s=tuple(s), poses=tuple(poses))
+
+
+def on_surface(
+    pose: Pose, roads: RoadNetwork, near: LaneLocation | None, height: float
+) -> tuple[Pose, LaneLocation | None]:
+    """Return a pose on the surface of the roads, with its height, pitch and roll, and the location there.
+
+    Without a road the pose is the same.
+
+    near, height  location before, if there is one, and height near which the surface is where roads overlap [m]
+    """
+    location = roads.locate_at(pose.x, pose.y, near, height)
+    if location is None:
+        return pose, None
+    surface = roads.pose(location)
+    level = surface.turned(wrap_angle(pose.h - surface.h))
+    return pose._replace(z=surface.z, p=level.p, r=level.r), location
 
 
 def _between(first: tuple[float, Pose], last: tuple[float, Pose]) -> Iterator[tuple[float, Pose]]:

@@ -22,12 +22,12 @@ FAR_CAMERA = np.diag([3.7**2, 0.4**2])
 """Covariance of a vehicle 40 m ahead of a camera that looks along x [m²]."""
 
 
-def body(car: ActorSpec, yaw: float = 0.0) -> OwnBody:
+def body(car: ActorSpec, yaw: float = 0.0, speed: float = 0.0) -> OwnBody:
     """Ego whose body center is at the origin at time 0."""
     cos, sin = math.cos(yaw), math.sin(yaw)
     ahead = car.offset[0]
     own = OwnBody(car, duration=1.0, dt=0.05)
-    own.record(EgoState(0.0, np.array([-ahead * cos, -ahead * sin, 0.0]), yaw, 0.0, 0.0, 0.0, 0.0, 0.0))
+    own.record(EgoState(0.0, np.array([-ahead * cos, -ahead * sin, 0.0]), yaw, 0.0, 0.0, speed, 0.0, 0.0))
     return own
 
 
@@ -78,6 +78,14 @@ def test_body_beside_the_outline_is_found_with_another_vehicle_on_it(car: ActorS
     vague = np.diag([0.25, 0.25])
     report = seen((2.2, 0.8), (0.0, -2.1), covariance=vague)
     assert kept(body(car), report, pose_covariance=np.diag([0.25, 0.25, 1e-4])) == []
+
+
+@pytest.mark.parametrize(("velocity", "left"), [(10.0, (-1.0, 2.0)), (math.nan, (1.0, -2.2))])
+def test_body_is_the_vehicle_with_its_velocity(car: ActorSpec, velocity: float, left: Place) -> None:
+    """A parked car is reported nearer to the moving ego than its body: without velocities it would be the body."""
+    report = seen((1.0, -2.2), (-1.0, 2.0), covariance=np.diag([1.0, 1.0]))
+    report = replace(report, velocity=np.array([(velocity, 0.0), (0.0 * velocity, 0.0)]))
+    assert kept(body(car, speed=10.0), report) == [left]
 
 
 @pytest.mark.parametrize("kind", ["pedestrian", "bicycle", "motorbike"])
