@@ -190,13 +190,18 @@ class Decider:
         """Another maneuver than the current one that has been best, and the time since when [s]."""
         self._time_gap = TimeGap(settings)
         self._oncoming = OncomingTraffic(view[0], times, body, settings)
-        self._behind = TrafficBehind(view[1], body, settings)
+        self._view_behind = view[1]
+        self._behind = self._neighbors()
+        """Traffic in the lanes to the left (1) and to the right (-1) of the line."""
         self._walking_pace = WalkingPace(settings, len(times))
         self._held_up = False
         self._passes = False
         """Whether the last decision was to pass in the oncoming lane, instead of waiting for it."""
         self._braking = 0.0
         """Deceleration of emergency braking if that was the last decision [m/s²], else 0."""
+
+    def _neighbors(self) -> dict[int, TrafficBehind]:
+        return {side: TrafficBehind(self._view_behind, self._body, self._settings) for side in (1, -1)}
 
     def line_changed(self, shift: float | None, aside: float) -> None:
         """Move the current maneuver to another line.
@@ -205,6 +210,8 @@ class Decider:
         aside  distance of the new line to the left of the one before [m], if the vehicle has changed to its lane
         """
         self._oncoming.line_changed(None if aside else shift)
+        if aside or shift is None:
+            self._behind = self._neighbors()
         current = self._current
         if current is None or shift is None:
             self._current = None
@@ -227,6 +234,10 @@ class Decider:
             profiles.append(given_up)
         if current.uses_oncoming and (early := shortened(situation, scene, current)) is not None:
             profiles.append(early)
+        beside = situation.lanes_ahead
+        for side, lane in ((1, beside.left), (-1, beside.right)):
+            if not math.isnan(lane):
+                self._behind[side].observe(scene, lane, situation.now)
         change = situation.change
         merges = change is not None and current.name == change.name
         self._time_gap.update(scene, (situation.s, situation.d), self._body, merges=merges)
@@ -234,9 +245,6 @@ class Decider:
             scene = with_followers(scene, change.offset, situation.motion, self._body)
         elif change is not None and (motion := self._required_change(situation, scene, change)) is not None:
             profiles.append(motion)
-        faster = situation.lanes_ahead.faster
-        if not math.isnan(faster):
-            self._behind.observe(scene, faster, situation.now)
         expects = self._held_up and settings.lane_changes
         options = self._options(situation, scene, profiles, with_maneuvers=expects)
         best = options.best(len(profiles))
@@ -538,6 +546,9 @@ class Decider:
         """
         offset, body = change.offset, self._body
         if situation.s < change.begin or not has_gap_now(scene, offset, situation.motion, body, MERGING_TIME_GAP):
+            return None
+        behind = self._behind[1 if offset > 0.0 else -1]
+        if not behind.leaves_gap(situation.limit, situation.speed, situation.now):
             return None
         profile = to_lane(offset, situation.start, self._settings.lateral_acceleration)
         s = self._motion(situation, scene, profile, MERGING_TIME_GAP).s

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -113,6 +113,12 @@ class Situation(msgspec.Struct, frozen=True):
     def lanes_ahead(self) -> LanesBeside:
         """Lanes beside the line shortly ahead of the vehicle."""
         return self.line.lanes_beside(self.s + VIEWED)
+
+    @property
+    def limit(self) -> float:
+        """Speed limit of the lane shortly ahead of the vehicle, else the wanted speed [m/s]."""
+        limit = self.lanes_ahead.limit
+        return self.wanted if math.isnan(limit) else limit
 
     def lanes_along(self, profile: LateralProfile) -> LanesBeside:
         """Return the lanes beside the line shortly ahead, or, if none of these is of the opposite direction, as in a
@@ -289,13 +295,13 @@ class _Obstacle(NamedTuple):
 
 
 def passing_profiles(
-    situation: Situation, scene: Surroundings, behind: TrafficBehind, *, has_begun: bool
+    situation: Situation, scene: Surroundings, behind: Mapping[int, TrafficBehind], *, has_begun: bool
 ) -> list[LateralProfile]:
     """Return maneuvers past what holds the vehicle up, or out of the way of an oncoming vehicle in its lane.
 
     The result is empty if the vehicle queues or nothing is free beside it.
 
-    behind     traffic behind in the lane for overtaking
+    behind     traffic in the lanes to the left (1) and to the right (-1)
     has_begun  whether the vehicle passes something already; what then appears behind that is no queue
     """
     head_on = _head_on(situation, scene)
@@ -320,8 +326,7 @@ def passing_profiles(
     last = situation.end if change is None else change.begin
     returns = situation.s < last if obstacle is None else obstacle.end < last or (change is None and not moves)
     may_change = not math.isnan(faster) and returns and not _is_shut(situation, scene, faster, blocker)
-    limit = situation.wanted if math.isnan(beside.limit) else beside.limit
-    may_change = may_change and behind.leaves_gap(limit, situation.speed, situation.now)
+    may_change = may_change and behind[overtaking].leaves_gap(situation.limit, situation.speed, situation.now)
     if may_change and has_gap_now(scene, faster, situation.motion, situation.body):
         profiles.append(to_lane(faster, situation.start, situation.settings.lateral_acceleration))
     if obstacle is not None:

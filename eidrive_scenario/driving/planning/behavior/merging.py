@@ -146,7 +146,7 @@ def costs_of_waiting(
 
 
 class TrafficBehind:
-    """Traffic in the lane for overtaking, and what may come there from behind out of view.
+    """Traffic in a neighboring lane, and what may come there from behind out of view.
 
     view  distance behind the reference point up to which a car is in view [m]
     """

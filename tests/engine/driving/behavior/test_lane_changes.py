@@ -241,3 +241,23 @@ def test_vehicle_changes_lanes_only_with_a_view_of_fast_traffic() -> None:
 def test_vehicle_with_a_view_of_fast_traffic_changes_lanes_in_a_gap() -> None:
     times, _ = fast_traffic_after(4.0, view=60.0)
     assert times[0] < 8.0
+
+
+def test_vehicle_merges_from_standstill_only_after_fast_traffic_out_of_view() -> None:
+    """It stands near the end of its lane, and its sensors show cars up to 25 m: those of 19 m/s need 62 m to stop."""
+    roads = road(2, 800.0, end=320.0)
+    planner = behavior(roads, 13.9)
+    planner.view = (ViewSector(0.0, 0.0, 1.8, 0.0, math.pi, 25.0),)
+    run = PlannedDrive(planner, roads, speed=0.0, start=300.0, y=LANE - WIDTH)
+    traffic = column(LANE, 19.0, 295.0, 19.0 * 4.0, 8)
+
+    def in_view(now: float) -> list[KnownBox]:
+        x = run.path[-1][0] if run.path else 300.0
+        return [car for car in traffic(now) if abs(car.x - x) < 25.0]
+
+    run.run(60.0, in_view, goal=Goal(waypoints=np.array([[700.0, LANE, 0.0]])))
+    run.world.close()
+    assert clearance(run, traffic) > 0.9
+    time, x = changed_at(run, LANE)
+    assert time > 7 * 4.0, "the last car has passed"
+    assert x < 320.0
