@@ -7,7 +7,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -228,7 +228,7 @@ def sample_trajectory(
     positions = [part for part in shape.walk() if isinstance(part, model.Position)]
     if roads is not None and all(_is_on_ground(position) for position in positions):
         tilts = not any(specifies(position, "p") or specifies(position, "r") for position in positions)
-        curve = _over_roads(curve, roads, [(0.0, curve.length, tilts)])
+        curve = _over_roads(curve, roads, [SurfacePart(0.0, curve.length, tilts)])
     return curve
 
 
@@ -242,36 +242,79 @@ def _is_on_ground(position: model.Position) -> bool:
     )
 
 
-SURFACE_SPACING = 1.0
-"""Maximum distance between samples of a polyline that follows the surface of a road [m]."""
+SURFACE_SPACING, SHORT_LINE = 1.0, 5.0
+"""Distance between the places at which a trajectory is laid on the surface of roads, and maximum length of a line
+between two positions on it that is close enough to it [m]: 6 mm on a crest with a radius of 500 m."""
+MAX_PLACES = 5_000
+"""Maximum number of such places of a trajectory, besides two per line; beyond 5 km their distance is larger."""
 
 
-def _over_roads(
-    curve: TrajectoryCurve, roads: RoadNetwork, spans: Sequence[tuple[float, float, bool]]
-) -> TrajectoryCurve:
-    """Return a curve with the heights of the roads, where it is on some.
+class SurfacePart(NamedTuple):
+    """Part of a trajectory that follows the surface of roads: begin and end [m], and whether its pitch and roll do."""
 
-    spans  begin and end of each part that follows the roads [m], and whether pitch and roll follow them as well
-    """
+    begin: float
+    end: float
+    tilts: bool
+
+
+def _over_roads(curve: TrajectoryCurve, roads: RoadNetwork, parts: Sequence[SurfacePart]) -> TrajectoryCurve:
+    """Return a curve whose parts have the heights of the roads, where they are on some."""
     if roads.is_flat:
         return curve
-    samples = list(zip(curve.s, curve.poses, strict=True))
-    if curve.stations:
-        samples = [sample for ends in pairwise(samples) for sample in _between(*ends)] + samples[-1:]
-    location: LaneLocation | None = None
-    s, poses = [place for place, _ in samples], [pose for _, pose in samples]
-    for begin, end, tilts in spans:
-        first = bisect_left(s, begin)
-        height = poses[first].z
-        for number in range(first, bisect_right(s, end)):
-            pose = poses[number]
-            # Where roads cross above each other, the surface is that near the one before.
-            level, location = on_surface(pose, roads, location, height)
-            height = level.z
-            poses[number] = level if tilts else pose._replace(z=height)
-    if all(abs(pose.z - linear.z) < EPSILON for pose, (_, linear) in zip(poses, samples, strict=True)):
-        return curve
-    return replace(curve, s=tuple(s), poses=tuple(poses))
+    spacing = max(SURFACE_SPACING, curve.length / MAX_PLACES)
+    s: list[float] = []
+    poses: list[Pose] = []
+    done, near = 0, None
+    for part in parts:
+        low, high = bisect_right(curve.s, part.begin) - 1, bisect_left(curve.s, part.end) + 1
+        samples = list(zip(curve.s[low:high], curve.poses[low:high], strict=True))
+        if curve.stations:
+            samples = [sample for ends in pairwise(samples) for sample in _between(*ends, spacing)] + samples[-1:]
+        laid, near = _laid(samples, roads, spacing, near, tilts=part.tilts)
+        if laid is not None:
+            shared = max(done - low, 0)  # The part before may end with the sample with which this one begins.
+            s += [*curve.s[done:low], *(place for place, _ in samples[shared:])]
+            poses += [*curve.poses[done:low], *laid[shared:]]
+            done = high
+    return replace(curve, s=(*s, *curve.s[done:]), poses=(*poses, *curve.poses[done:]))
+
+
+def _laid(
+    samples: Sequence[tuple[float, Pose]],
+    roads: RoadNetwork,
+    spacing: float,
+    near: LaneLocation | None,
+    *,
+    tilts: bool,
+) -> tuple[list[Pose] | None, LaneLocation | None]:
+    """Return the poses of samples on the surface of roads, found about every `spacing` [m], and the last location.
+
+    The poses are None if the samples are on the surface.
+
+    near  location before the samples, if there is one
+    """
+    places = [0]
+    for number in range(1, len(samples)):
+        if samples[number][0] - samples[places[-1]][0] >= spacing or number == len(samples) - 1:
+            places.append(number)
+    levels: list[Pose] = []
+    height = samples[0][1].z
+    for number in places:
+        # Where roads cross above each other, the surface is that near the one before.
+        level, near = on_surface(samples[number][1], roads, near, height)
+        height = level.z
+        levels.append(level)
+    poses = [pose for _, pose in samples]
+    rises = [level.z - poses[number].z for level, number in zip(levels, places, strict=True)]
+    if all(abs(rise) < EPSILON for rise in rises):
+        return None, near
+    stations = [samples[number][0] for number in places]
+    columns = (rises, [level.p for level in levels], [level.r for level in levels])
+    over = np.column_stack([np.interp([place for place, _ in samples], stations, column) for column in columns])
+    return [
+        pose._replace(z=pose.z + rise, p=p, r=r) if tilts else pose._replace(z=pose.z + rise)
+        for pose, (rise, p, r) in zip(poses, over.tolist(), strict=True)
+    ], near
 
 
 def on_surface(
@@ -291,10 +334,10 @@ def on_surface(
     return pose._replace(z=surface.z, p=level.p, r=level.r), location
 
 
-def _between(first: tuple[float, Pose], last: tuple[float, Pose]) -> Iterator[tuple[float, Pose]]:
-    """Yield a sample of a polyline, and further ones at most SURFACE_SPACING apart up to the next one."""
+def _between(first: tuple[float, Pose], last: tuple[float, Pose], spacing: float) -> Iterator[tuple[float, Pose]]:
+    """Yield a sample of a polyline, and further ones at most `spacing` [m] apart up to the next one."""
     (begin, a), (end, b) = first, last
-    count = max(1, math.ceil((end - begin) / SURFACE_SPACING))
+    count = max(1, math.ceil((end - begin) / spacing))
     for number in range(count):
         share = number / count
         yield begin + share * (end - begin), blend(a, b, share) if number else a
@@ -360,12 +403,12 @@ def _polyline(shape: model.Polyline, closed: bool, resolve: Resolve, roads: Road
     if roads is None:
         return curve
     pairs = zip(pairwise(curve.stations), pairwise(vertices), strict=True)
-    spans = [
-        (begin, end, not a.is_tilted and not b.is_tilted)
+    parts = [
+        SurfacePart(begin, end, not a.is_tilted and not b.is_tilted)
         for (begin, end), (a, b) in pairs
-        if a.is_on_ground and b.is_on_ground
+        if a.is_on_ground and b.is_on_ground and end - begin > SHORT_LINE
     ]
-    return _over_roads(curve, roads, spans)
+    return _over_roads(curve, roads, parts)
 
 
 def _vertex(position: model.Position, resolve: Resolve) -> PolylineVertex:

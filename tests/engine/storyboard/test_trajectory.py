@@ -406,6 +406,25 @@ def test_polyline_without_heights_is_on_the_road() -> None:
     assert over_the_hill(None, h=math.pi).at(50.0).p == pytest.approx(math.atan(0.05)), "it faces against the slope"
 
 
+@pytest.mark.parametrize("heading", [None, 0.0])
+def test_polyline_is_on_the_road_beside_lines_with_heights(heading: float | None) -> None:
+    """Vertices at 0, 40, 100, 150 and 200 m; the third one is 8 m high, above the crest of 5 m."""
+    places = ((0.0, None, 0.0), (40.0, None, 3.2), (100.0, 8.0, 8.0), (150.0, None, 3.75), (200.0, None, 0.0))
+    height_at = {x: height for x, _, height in places}
+    vertices = tuple(
+        model.Vertex(position=model.Position(world_position=model.WorldPosition(x=x, y=-1.75, z=z, h=heading)))
+        for x, z, _ in places
+    )
+    way = sample_trajectory(
+        trajectory(polyline=model.Polyline(vertex=vertices)),
+        lambda position: resolve_with_pitch(position)._replace(z=height_at[resolve(position).x]),
+        roads=HILL,
+    )
+    expected = {0.0: 0.0, 20.0: 1.8, 40.0: 3.2, 70.0: 5.6, 100.0: 8.0, 125.0: 5.875, 175.0: 2.1875, 200.0: 0.0}
+    assert {s: way.at(s).z for s in expected} == pytest.approx(expected)
+    assert list(way.s) == sorted(way.s)
+
+
 def test_specified_heights_and_pitches_are_kept_on_a_hill() -> None:
     assert over_the_hill(0.0).at(100.0).z == 0.0
     pitched = over_the_hill(None, p=0.2).at(50.0)
