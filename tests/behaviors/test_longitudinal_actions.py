@@ -220,6 +220,47 @@ def test_speed_profile_single_change_starts_and_ends_without_acceleration() -> N
     assert segments[3].time == 5.0
 
 
+@pytest.mark.parametrize("before", [-6.0, -3.0, -0.5, 0.5, 3.0, 6.0])
+@pytest.mark.parametrize(("first", "last"), [(10.0, 4.0), (4.0, 10.0), (10.0, 10.0), (10.0, 9.0)])
+@pytest.mark.parametrize("span", [0.1, 2.0, 6.0])
+def test_speed_profile_continues_the_acceleration_before_it(
+    before: float, first: float, last: float, span: float
+) -> None:
+    up, down, rise, fall = 4.0, 3.0, 5.0, 8.0
+    segments = smoothed_segments([(0.0, first), (span, last)], up, down, rise, fall, before)
+    assert segments is not None
+    assert (segments[0].speed, segments[0].slope) == (first, before)
+    for segment, later in pairwise(segments):
+        assert later.speed == pytest.approx(segment.at(later.time))
+        assert later.slope == pytest.approx(segment.slope_at(later.time), abs=1e-9)
+        assert segment.bend == pytest.approx(0.0) or segment.bend in (up, -down)
+        assert -max(fall, -before) - 1e-9 <= later.slope <= max(rise, before) + 1e-9
+    assert (segments[-1].speed, segments[-1].slope) == (last, 0.0)
+    assert segments[-1].time >= span - 1e-9
+
+
+def test_speed_profile_with_initial_acceleration_has_the_speeds_of_esmini() -> None:
+    """Values of its test TestSpeedProfileNonZeroInitalAcc: from 10 m/s and 1 m/s² to 4 m/s in 5 s."""
+    segments = smoothed_segments([(0.0, 10.0), (5.0, 4.0)], 5.0, 4.0, 4.0, 10.0, 1.0)
+    assert segments is not None
+    places = {time: next(segment for segment in reversed(segments) if segment.time <= time) for time in (0.3, 4.9, 5.1)}
+    assert [segment.at(time) for time, segment in places.items()] == pytest.approx([10.12, 4.025, 4.0], abs=1e-3)
+
+
+def test_speed_profile_interrupts_a_braking_in_the_shortest_time(scene: RunScene) -> None:
+    """A stop from 15 m/s while braking with 5 m/s²: the slope falls to -a at 3 m/s³ and rises to 0 at 4 m/s³.
+
+    (a² - 25) / 6 + a² / 8 = 15 m/s gives a = 8.106 m/s², after 1.035 s, and 2.027 s more.
+    """
+    rates = 'maxAccelerationRate="4" maxDecelerationRate="3"'
+    stop = profile("follow", (None, 0.0), rates=rates, limits='maxAcceleration="5" maxDeceleration="20"')
+    played = scene(6, ("Ego", speed(absolute(0.0), "linear", "rate", 5.0)), ("Ego", stop, after(0.95)))
+    assert played.at(1.0).speed == pytest.approx(15.0)
+    assert played.at(1.5).speed == pytest.approx(15.0 - 5.0 * 0.5 - 1.5 * 0.5**2)
+    assert played.at(2.0).speed == pytest.approx(15.0 - 5.0 * 1.0 - 1.5 * 1.0**2)
+    assert played.when("action 1", "completeState") == pytest.approx(1.0 + 1.035 + 2.027, abs=0.11)
+
+
 @pytest.mark.element("SpeedProfileAction")
 @pytest.mark.parametrize("own", [False, True])
 def test_speed_profile_limits_of_the_action_precede_the_vehicle(scene: RunScene, own: bool) -> None:

@@ -35,15 +35,19 @@ class SpeedSegment:
         return self.slope + self.bend * (time - self.time)
 
 
+STEADY = 0.1
+"""Maximum acceleration of an actor whose speed counts as constant [m/s²]: numerical differences in curves are not 0."""
+
+
 class SpeedProfileAction(ActionBehaviour):
     """Sequence of entry speeds, each reached after its `time` or as fast as the limits allow.
 
     The limits are those of the action, which have precedence over those of the vehicle's Performance (1.3.1,
     SpeedProfileAction). An entry that they do not allow in its time is reached later. In the following mode `position`
-    the speed is linear between entries. In `follow` the acceleration is zero at both ends and its change respects the
-    rate limits: corners of the profile become parabolas. Where corners are too close for that, the speed follows the
-    linear profile as fast as the limits allow. A first entry at time 0 is a step in `position`, and the current speed
-    in `follow`. With an entity, speeds are relative to its speed at the start.
+    the speed is linear between entries. In `follow` the acceleration begins as it was before the action and ends with
+    zero, and its change respects the rate limits: corners of the profile become parabolas. Where corners are too close
+    for that, the speed follows the linear profile as fast as the limits allow. A first entry at time 0 is a step in
+    `position`, and the current speed in `follow`. With an entity, speeds are relative to its speed at the start.
     """
 
     domains = Domain.LONGITUDINAL
@@ -78,15 +82,27 @@ class SpeedProfileAction(ActionBehaviour):
             rates = (min(rates),) * 2 if forwards else (rates[1], rates[0])
             slopes = (min(slopes),) * 2 if forwards else (slopes[1], slopes[0])
         up, down = rates
-        segments = smoothed_segments(corners, up, down, *slopes)
+        rate = self._acceleration()
+        segments = smoothed_segments(corners, up, down, *slopes, slope_before=rate)
         if segments is None or (len(corners) == 2 and segments[-1].time > corners[-1][0] + EPSILON):
             late = "entries are reached later than at their times"
             self._delay_warning.add(late, f"the rates of the acceleration are limited to {up:g} and {down:g} m/s³")
         if segments is None:
             start = corners[0][1]
-            self._limiter = RateLimitedValue(start, 0.0, up=up, down=down, lowest=-slopes[1], highest=slopes[0])
+            self._limiter = RateLimitedValue(start, rate, up=up, down=down, lowest=-slopes[1], highest=slopes[0])
         else:
             self._segments = segments
+
+    def _acceleration(self) -> float:
+        """Return the acceleration of the actor along its heading in the last step [m/s²]; 0 if it is steady."""
+        view = self.context.view
+        row = view.rows.get(self.actor.name)
+        if row is None or self.context.dt == 0.0:
+            return 0.0
+        yaw = float(view.yaw[row])
+        x, y, _ = view.acceleration[row].tolist()
+        rate = x * math.cos(yaw) + y * math.sin(yaw)
+        return rate if abs(rate) > STEADY else 0.0
 
     def update(self) -> Status:
         """Set the speed at the end of the step."""
@@ -164,18 +180,20 @@ def smoothed_segments(
     down: float,
     rise: float = math.inf,
     fall: float = math.inf,
+    slope_before: float = 0.0,
 ) -> list[SpeedSegment] | None:
     """Return the profile with parabolic corners and slope changes of `up` and `down` [m/s³]; None if they overlap.
 
-    The lines between the corners are within the limits `rise` and `fall` of the slope [m/s²].
+    The lines between the corners are within the limits `rise` and `fall` of the slope [m/s²], which begins with that
+    before the profile.
     """
     if len(corners) < 2:
         return linear_segments(corners)
     if len(corners) == 2:
-        return _smoothed_change(corners[0], corners[1], up, down, rise, fall)
+        return _smoothed_change(corners[0], corners[1], up, down, rise, fall, slope_before)
     lines = linear_segments(corners)
     segments: list[SpeedSegment] = []
-    time, speed, slope = 0.0, corners[0][1], 0.0
+    time, speed, slope = 0.0, corners[0][1], slope_before
     for number, line in enumerate(lines):
         bend = up if line.slope > slope else -down
         span = (line.slope - slope) / bend
@@ -198,29 +216,46 @@ def smoothed_segments(
 
 
 def _smoothed_change(
-    first: tuple[float, float], last: tuple[float, float], up: float, down: float, rise: float, fall: float
+    first: tuple[float, float],
+    last: tuple[float, float],
+    up: float,
+    down: float,
+    rise: float,
+    fall: float,
+    slope_before: float,
 ) -> list[SpeedSegment]:
-    """Return one speed change without acceleration at its ends, in the given time or the shortest possible one.
+    """Return one speed change that ends without acceleration, in the given time or the shortest possible one.
 
-    The slope changes at j1 at the start and at j2 at the end, with a segment of constant slope a between. The speed
-    change is a (T - a/2 (1/j1 + 1/j2)); the shorter T, the larger is a, up to the limit of the slope, or the value at
-    which the segment between vanishes.
+    The slope changes from that before to a at j1, and to 0 at j2, with a segment of constant slope between. The shorter
+    the time T, the larger is a, up to the limit of the slope, or the value at which the segment between vanishes. With
+    b = T + a0 / j1 and c = change + a0² / (2 j1) it solves c = a b - a² / 2 (1 / j1 + 1 / j2). If a0 is above a, the
+    slope falls to a at j2 instead.
     """
     change, span = last[1] - first[1], last[0] - first[0]
-    sign = math.copysign(1.0, change)
-    start, end, limit = (up, down, rise) if change > 0.0 else (down, up, fall)
-    inverse = 0.5 * (1.0 / start + 1.0 / end)
-    discriminant = span * span - 4.0 * inverse * abs(change)
-    slope = 2.0 * abs(change) / (span + math.sqrt(max(discriminant, 0.0)))
-    largest = min(limit, math.sqrt(abs(change) / inverse) if inverse > 0.0 else math.inf)
-    if slope > largest:
-        slope = largest
-        span = abs(change) / slope + inverse * slope
-    t1, t2 = slope / start, span - slope / end
-    v1 = first[1] + sign * 0.5 * slope * t1
+    settling = 0.5 * slope_before * abs(slope_before) / (down if slope_before > 0.0 else up)
+    sign = math.copysign(1.0, change - settling)
+    start, end, limit = (up, down, rise) if sign > 0.0 else (down, up, fall)
+    change, before = sign * change, sign * slope_before
+    held, rest = span - before / end, change - 0.5 * before * before / end
+    if before > 0.0 and (before > limit or rest <= before * held):
+        slope = min(rest / held if held > 0.0 else math.inf, before, limit)
+        span = before / end + (rest / slope if slope > 0.0 else max(held, 0.0))
+        t1, bend = (before - slope) / end, -sign * end
+    else:
+        inverse = 0.5 * (1.0 / start + 1.0 / end)
+        b, c = span + before / start, change + 0.5 * before * before / start
+        discriminant = b * b - 4.0 * inverse * c
+        slope = 2.0 * c / (b + math.sqrt(discriminant)) if b > 0.0 and discriminant >= 0.0 else math.inf
+        largest = min(limit, math.sqrt(c / inverse) if inverse > 0.0 else math.inf)
+        if slope > largest:
+            slope = largest
+            span = c / slope + inverse * slope - before / start
+        t1, bend = (slope - before) / start, sign * start
+    t2 = span - slope / end
+    v1 = first[1] + sign * 0.5 * (before + slope) * t1
     v2 = v1 + sign * slope * (t2 - t1)
     segments = [
-        SpeedSegment(0.0, first[1], 0.0, sign * start),
+        SpeedSegment(0.0, first[1], slope_before, bend),
         SpeedSegment(t1, v1, sign * slope),
         SpeedSegment(t2, v2, sign * slope, -sign * end),
         SpeedSegment(span, last[1], 0.0),
