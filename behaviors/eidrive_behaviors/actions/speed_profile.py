@@ -12,6 +12,7 @@ from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import DelayWarning, RateLimitedValue, check_presence, warn_of_reverse
 from eidrive_behaviors.actions.speed import describe_slope_limit, slope_limit
+from eidrive_behaviors.conditions.motion import component_of
 from eidrive_scenario.api.actions import ActionBehaviour, Domain, Goal, model
 from eidrive_scenario.api.common import EPSILON
 
@@ -95,13 +96,12 @@ class SpeedProfileAction(ActionBehaviour):
 
     def _acceleration(self) -> float:
         """Return the acceleration of the actor along its heading in the last step [m/s²]; 0 if it is steady."""
-        view = self.context.view
-        row = view.rows.get(self.actor.name)
-        if row is None or self.context.dt == 0.0:
+        view, name = self.context.view, self.actor.name
+        if name not in view or self.context.dt == 0.0:
             return 0.0
-        yaw = float(view.yaw[row])
-        x, y, _ = view.acceleration[row].tolist()
-        rate = x * math.cos(yaw) + y * math.sin(yaw)
+        index = view.row(name)
+        vector, yaw = view.acceleration[index].tolist(), float(view.yaw[index])
+        rate = component_of(vector, yaw, model.DirectionalDimension.LONGITUDINAL)
         return rate if abs(rate) > STEADY else 0.0
 
     def update(self) -> Status:

@@ -318,13 +318,14 @@ def _laid(
 
 
 def on_surface(
-    pose: Pose, roads: RoadNetwork, near: LaneLocation | None, height: float
+    pose: Pose, roads: RoadNetwork, near: LaneLocation | None, height: float | None = None
 ) -> tuple[Pose, LaneLocation | None]:
     """Return a pose on the surface of the roads, with its height, pitch and roll, and the location there.
 
     Without a road the pose is the same.
 
-    near, height  location before, if there is one, and height near which the surface is where roads overlap [m]
+    near    location before, if there is one
+    height  height near which the surface is where roads overlap [m]
     """
     location = roads.locate_at(pose.x, pose.y, near, height)
     if location is None:

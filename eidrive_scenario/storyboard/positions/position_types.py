@@ -12,6 +12,7 @@ from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route
 from eidrive_scenario.storyboard.context.contexts import ConditionContext
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
+from eidrive_scenario.storyboard.kinematics.trajectory_sampling import on_surface
 
 
 def oriented(orientation: model.Orientation | None, base: Pose) -> Pose:
@@ -110,13 +111,9 @@ def on_ground(context: ConditionContext, pose: Pose, *, z_given: bool, near: str
     """Return the position of a pose, on the road if there is one; the search begins at the actor `near`."""
     if context.roads is None:
         return ResolvedPosition(pose)
-    here = context.roads.locate_at(pose.x, pose.y, None if near is None else context.location(near))
-    if here is None:
-        return ResolvedPosition(pose)
+    level, here = on_surface(pose, context.roads, None if near is None else context.location(near))
     if not z_given:
-        ground = context.roads.lane_pose_at(here.road, here.lane, here.s, here.offset)
-        level = ground.turned(wrap_angle(pose.h - ground.h))
-        pose = Pose(pose.x, pose.y, ground.z, pose.h, pose.p or level.p, pose.r or level.r)
+        pose = level._replace(p=pose.p or level.p, r=pose.r or level.r)
     return ResolvedPosition(pose, here)
 
 
