@@ -9,8 +9,8 @@ import numpy as np
 
 from eidrive_scenario.base.geometry import segment_distance
 from eidrive_scenario.base.tolerances import EPSILON
-from eidrive_scenario.perception.traffic_lights import ON_PATH, OTHER_LEVEL, SAME_WAY, StopLine, stop_lines
-from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.perception.traffic_lights import ON_PATH, SAME_WAY, StopLine, stop_lines
+from eidrive_scenario.roads import OTHER_LEVEL, RoadNetwork
 from eidrive_scenario.sensing.signals import Kind
 
 NEAR = 30.0

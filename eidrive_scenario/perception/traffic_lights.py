@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.roads import LaneKey, RoadNetwork, Signal
+from eidrive_scenario.roads import OTHER_LEVEL, LaneKey, RoadNetwork, Signal
 from eidrive_scenario.roads.model.road_map import SignalPlace
 from eidrive_scenario.roads.model.signal_states import lamp_colors, must_stop, shows_red
 from eidrive_scenario.sensing.readings import SignalReading
@@ -20,9 +20,6 @@ ON_PATH = 1.75
 """Maximum distance between a path and the lane center at the stop line of the lane [m]."""
 NEAR_SIDE = 10.0
 """Maximum distance of a light from the entry of its junction, along and across, at which it stands before it [m]."""
-OTHER_LEVEL = 3.5
-"""Difference of height from which on a road user is on another level than a road, such as a bridge [m]: less than the
-clearance of bridges, 4.5 m, by an error of 1 m."""
 SAME_WAY = math.cos(math.radians(45.0))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -27,7 +28,6 @@ from eidrive_scenario.roads.model.signal_states import GREEN, RED, YELLOW, lamp_
 from eidrive_scenario.world.actor import ActorSpec, ExtraAxle, Vector3
 from eidrive_scenario.world.appearance import Appearance
 from eidrive_scenario.world.camera import FIRST_SIGNAL_LABEL, Pinhole, Radiance, VisibleState
-from eidrive_scenario.world.physics.bodies import GroundUnder
 from eidrive_scenario.world.physics.scenery import Scenery
 from eidrive_scenario.world.road_objects import Building, RoadObjectBody, SignalHead, signal_heads
 from eidrive_scenario.world.view import ActorState
@@ -151,7 +151,6 @@ class Visuals:
         self._ground = self._ground_parts()
         self._renderer = Renderer()
         self._buildings: Model | None = None
-        self._below: GroundUnder | None = None if scenery.level else GroundUnder(scenery.roads)
 
     def image(self, state: VisibleState, pose: Array, pinhole: Pinhole, ignore: Collection[str]) -> SceneImage:
         """Return the image of a camera. Actors that the scenario makes invisible cast no shadows and emit no light."""
@@ -181,9 +180,15 @@ class Visuals:
         if self._buildings is not None:
             glowing = {"window_lit": WINDOW_LIGHT} if weather.lamps_on and weather.sun_elevation < 3.0 else {}
             standing.insert(0, MeshInstance(self._buildings, np.eye(3), np.zeros(3), -1, glowing))
-        ground = self._below.at(float(pose[0, 3]), float(pose[1, 3]), 0.0)[0] if self._below is not None else 0.0
         subjects = Subjects(self._ground, standing, actors, ignored)
-        return SceneImage(self._renderer, ImageContent(subjects, beams, weather, pose, pinhole, ground))
+        content = ImageContent(subjects, beams, weather, pose, pinhole, self._height_below(*pose[:3, 3].tolist()))
+        return SceneImage(self._renderer, content)
+
+    def _height_below(self, x: float, y: float, z: float) -> float:
+        """Return the height of the nearest road at a camera [m]."""
+        roads = self._scenery.roads
+        near = None if roads is None or self._scenery.level else roads.locate_at(x, y, z=z, reach=math.inf)
+        return 0.0 if roads is None or near is None else roads.pose(near).z
 
     def _ground_parts(self) -> list[MeshInstance]:
         """Return roads, markings and surrounding land, split by a grid."""

@@ -14,6 +14,8 @@ from eidrive_scenario.roads.model.road_map import RoadObject as RoadObject
 from eidrive_scenario.roads.model.road_map import Signal as Signal
 from eidrive_scenario.roads.model.road_map import SignalController as SignalController
 from eidrive_scenario.roads.model.road_map import SignalPlace as SignalPlace
+from eidrive_scenario.roads.network import ALIGNED as ALIGNED
+from eidrive_scenario.roads.network import OTHER_LEVEL as OTHER_LEVEL
 from eidrive_scenario.roads.network import RoadNetwork as RoadNetwork
 from eidrive_scenario.roads.network import fastest as fastest
 from eidrive_scenario.roads.network import fewest_junctions as fewest_junctions

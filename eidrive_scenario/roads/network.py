@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.errors import Diagnostic, suggestion
 from eidrive_scenario.files.bounded import path_argument
 from eidrive_scenario.roads.geometry import poses
@@ -27,7 +28,7 @@ from eidrive_scenario.roads.georeference import GeoReference, parse_geo_referenc
 from eidrive_scenario.roads.map_checks import check_road_map, missing_lane_link
 from eidrive_scenario.roads.model.location import LaneKey, LaneLocation, LaneLocations, Pose, Poses, PositionError
 from eidrive_scenario.roads.model.map_warnings import group_map_warnings
-from eidrive_scenario.roads.model.road_map import Junction, Road, RoadMap, Signal, SignalController, SignalPlace
+from eidrive_scenario.roads.model.road_map import Junction, Lane, Road, RoadMap, Signal, SignalController, SignalPlace
 from eidrive_scenario.roads.reading import parse_road_map, read_road_text
 from eidrive_scenario.roads.routing.distance import Chain, RoadDistances, locate_near
 from eidrive_scenario.roads.routing.graph import (
@@ -50,6 +51,15 @@ if TYPE_CHECKING:
 
 KEPT = 2
 """Maximum number of road networks that are kept for the next run."""
+OTHER_LEVEL = 3.5
+"""Difference of height from which on a road user is on another level than a road, such as a bridge [m]: less than the
+clearance of bridges, 4.5 m, by an error of 1 m."""
+ALIGNED = 0.6
+"""Maximum angle between the headings of a vehicle and of the lane that it follows [rad]."""
+FRONT = 4.0
+"""Distance from the reference point of a car to its front, about [m]: an angle to a lane counts as its deviation."""
+LEAST_GAIN = 0.5
+"""Minimum difference of deviations from two lanes for which a road user is not on the lane where it was before [m]."""
 
 
 class RoadNetwork:
@@ -346,6 +356,71 @@ class RoadNetwork:
                 return near
         heights = None if z is None else np.array([z])
         return self._locator.locate(np.array([x]), np.array([y]), heights, reach).location(0)
+
+    def locations_at(self, x: float, y: float) -> list[LaneLocation]:
+        """Return the locations on all roads that overlap a point in plan view, on all levels."""
+        columns = (column.tolist() for column in self._locator.roads_at(x, y))
+        return [self.road_location(self.tables.ids[road], s, t) for road, s, t in zip(*columns, strict=True)]
+
+    def locate_pose(
+        self,
+        x: float,
+        y: float,
+        heading: float | None,
+        z: float | None = None,
+        hint: LaneLocation | None = None,
+        *,
+        drivable: bool = False,
+    ) -> LaneLocation | None:
+        """Return the lane location of a road user, or None if no road is within reach.
+
+        Where lanes overlap, in a junction or on and below a bridge, it is on the lane at the height z [m], if given,
+        that best fits the heading and has the nearest center, or on that of `hint` if it fits as well. If no lane leads
+        in its direction, the location is that of `locate_at`.
+
+        heading   its direction [rad], if given
+        drivable  prefer lanes for vehicles where lanes overlap
+        """
+        nearest = self.locate_at(x, y, hint)
+        if nearest is None:
+            return None
+
+        def angle(location: LaneLocation) -> float:
+            return 0.0 if heading is None else self.angle_to_lane(location, heading)
+
+        def deviation(location: LaneLocation) -> float:
+            return abs(location.offset) + FRONT * angle(location)
+
+        below = self.locations_at(x, y)
+        if z is not None:
+            below = [location for location in below if self.is_on_level(location, z)]
+            if not self.is_on_level(nearest, z):
+                nearest = min(below, key=deviation, default=self.locate_at(x, y, z=z) or nearest)
+        if len(below) < 2:
+            return nearest
+        if drivable:
+            below = [location for location in below if self._lane(location).drivable] or below
+        aligned = [location for location in below if angle(location) <= ALIGNED]
+        # Lanes that part later coincide at first: as on the default route, the one on the road with the smallest turn.
+        best = min(aligned, key=lambda location: (round(deviation(location), 3), self._turn(location)), default=nearest)
+        return nearest if hint is not None and deviation(nearest) <= deviation(best) + LEAST_GAIN else best
+
+    def _turn(self, location: LaneLocation) -> float:
+        road = self.road(location.road)
+        return abs(wrap_angle(road.reference.at(road.length).h - road.reference.at(0.0).h))
+
+    def _lane(self, location: LaneLocation) -> Lane:
+        return poses.lane_at(self.road(location.road), location.lane, location.s)[1]
+
+    def is_on_level(self, location: LaneLocation, z: float) -> bool:
+        """Return whether a road user at height z [m] is on the level of a road, not above or below it."""
+        return self.is_level or abs(self.road_pose_at(location.road, location.s, location.t).z - z) <= OTHER_LEVEL
+
+    def angle_to_lane(self, location: LaneLocation, heading: float) -> float:
+        """Return the angle between a heading and the driving direction of a lane [rad]."""
+        along = self.lane_pose_at(location.road, location.lane, location.s).h
+        against = self.driving_direction(location.road, location.lane) < 0
+        return abs(wrap_angle(heading - along - (math.pi if against else 0.0)))
 
     def location(self, road_id: str, lane_id: int, s: float, offset: float = 0.0) -> LaneLocation:
         """Return the lane location with these coordinates, including its t. Raise PositionError."""

@@ -316,7 +316,7 @@ class World:
     def _enter(self, spec: ActorSpec, placement: Placement, driven: bool) -> None:
         if driven:
             self._scenery.raise_obstacles()
-            ground = GroundUnder(None if self._scenery.level else self._roads, placement.z)
+            ground = GroundUnder(None if self._scenery.level else self._roads)
             body = DrivenBody(self._client, spec, placement, self.dt, self._physics.step, ground)
             self._driven[spec.name] = body
             self._bodies[spec.name] = body

@@ -1,4 +1,4 @@
-"""Paths, the level of a station on roads above each other, and the lane below it."""
+"""Paths, and the level of a station on roads above each other."""
 
 from __future__ import annotations
 
@@ -11,10 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.base.geometry import distances_along, segment_distance, wrap_angle
-from eidrive_scenario.perception.traffic_lights import OTHER_LEVEL
-from eidrive_scenario.roads import LaneLocation, RoadNetwork
-from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.base.geometry import distances_along, segment_distance
+from eidrive_scenario.roads import OTHER_LEVEL, RoadNetwork
 
 SPACING = 1.0
 """Distance between the points of a path [m]."""
@@ -189,46 +187,3 @@ def is_on_level(point: Array, points: Array, heights: Array) -> bool:
     nearest = float(gap.min())
     there = heights[gap <= nearest + SAME_PLACE]
     return nearest > NEAR_PATH or bool(np.any(np.abs(there - point[2]) <= OTHER_LEVEL))
-
-
-ALIGNED = 0.6
-"""Maximum angle between the headings of a vehicle and of the lane that it follows [rad]."""
-
-
-def lane_below(roads: RoadNetwork, ego: EgoState) -> LaneLocation | None:
-    """Return the lane of a vehicle, or None if no road is near.
-
-    The nearest lane may be that of a road above or below, or of crossing traffic in a junction. Then the overlapping
-    lane on the level of the vehicle is selected whose traffic drives closest to its heading, if it is aligned.
-    """
-    x, y, z = ego.position.tolist()
-    location = roads.locate_at(x, y)
-    if location is None:
-        return None
-    is_level = _is_level(roads, location, z)
-    if is_level and angle_to_lane(roads, location, ego.yaw) <= ALIGNED:
-        return location
-    height = None if roads.is_level else np.array([z])
-    lanes, along, _ = roads.overlapped_lanes(np.array([x]), np.array([y]), height)
-    keys = roads.tables.lane_keys
-    candidates = [
-        roads.location(keys[lane].road, keys[lane].lane, s)
-        for lane, s in zip(lanes.tolist(), along.tolist(), strict=True)
-        if roads.tables.lane_drivable[lane]
-    ]
-    candidates = [candidate for candidate in candidates if _is_level(roads, candidate, z)]
-    best = min(candidates, key=lambda candidate: angle_to_lane(roads, candidate, ego.yaw), default=location)
-    return best if not is_level or angle_to_lane(roads, best, ego.yaw) <= ALIGNED else location
-
-
-def _is_level(roads: RoadNetwork, location: LaneLocation, z: float) -> bool:
-    """Return whether a lane is on the level of a vehicle at height z [m]."""
-    return roads.is_level or abs(roads.road_pose_at(location.road, location.s, location.t).z - z) <= OTHER_LEVEL
-
-
-def angle_to_lane(roads: RoadNetwork, location: LaneLocation, yaw: float) -> float:
-    """Return the angle between a heading and the driving direction of a lane [rad]."""
-    heading = roads.lane_pose_at(location.road, location.lane, location.s).h
-    if roads.driving_direction(location.road, location.lane) < 0:
-        heading += math.pi
-    return abs(float(wrap_angle(yaw - heading)))

@@ -19,8 +19,6 @@ from eidrive_scenario.driving.planning.path import (
     SPACING,
     PathPart,
     PlannedPath,
-    angle_to_lane,
-    lane_below,
     path_heights,
 )
 from eidrive_scenario.driving.planning.signal_stops import CanReadLight, SignalStops, StopPoint
@@ -190,7 +188,7 @@ class RoutePlanner(Planner):
         if self.settings.follow_speed_limit and self.roads is not None:
             x, y, _ = ego.position.tolist()
             before = self._location
-            here = lane_below(self.roads, ego) if before is None else self.roads.locate_at(x, y, before)
+            here = _lane_below(self.roads, ego) if before is None else self.roads.locate_at(x, y, before)
             limit = None if here is None else self.roads.speed_limit(here.road, here.s, here.lane)
             self._location = here
             return min(assumed_speed(limit), self.spec.max_speed)
@@ -240,7 +238,7 @@ class RoutePlanner(Planner):
         """Return the route through all waypoints; None if one of them or the vehicle is outside the road."""
         if self.roads is None:
             return None
-        locations = [lane_below(self.roads, ego), *(self.roads.locate_at(x, y) for x, y in waypoints[:, :2].tolist())]
+        locations = [_lane_below(self.roads, ego), *(self.roads.locate_at(x, y) for x, y in waypoints[:, :2].tolist())]
         on_road = [location for location in locations if location is not None]
         if len(on_road) < len(locations):
             return None
@@ -263,10 +261,15 @@ class RoutePlanner(Planner):
         return PlannedPath(ego.position[:2] + reach * np.array([[math.cos(yaw), math.sin(yaw)]]), ends=False)
 
 
+def _lane_below(roads: RoadNetwork, ego: EgoState) -> LaneLocation | None:
+    x, y, z = ego.position.tolist()
+    return roads.locate_pose(x, y, ego.yaw, z, drivable=True)
+
+
 def _lane_at(roads: RoadNetwork, ego: EgoState) -> list[LaneLocation]:
     """Return the lane at the vehicle, or the nearest one in its direction if traffic of that lane drives against it."""
-    location = lane_below(roads, ego)
-    if location is None or angle_to_lane(roads, location, ego.yaw) < math.pi / 2.0:
+    location = _lane_below(roads, ego)
+    if location is None or roads.angle_to_lane(location, ego.yaw) < math.pi / 2.0:
         return [] if location is None else [location]
     road, against = location.road, roads.driving_direction(location.road, location.lane)
     lanes = [

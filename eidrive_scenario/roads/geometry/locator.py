@@ -188,6 +188,17 @@ class Locator:
         hit[open_] = (beyond <= 0.0) & (outside <= 0.0)
         return row[hit], s[hit], points[hit]
 
+    def roads_at(self, x: float, y: float) -> tuple[Integers, Array, Array]:
+        """Return all roads that overlap a point in plan view, on all levels, with s and t there."""
+        close = (((self.sample_points - (x, y)) ** 2).sum(axis=1) <= self._from_samples**2).nonzero()[0]
+        road, at = self._road[close], np.ones(len(close))
+        s, t, beyond, _ = self._refine(road, self._s[close], x * at, y * at, self._frames_at(close))
+        on = (beyond <= 0.0) & (self._tables.lane_beside(road, s, t)[1] <= 0.0)
+        road, s, t = road[on], s[on], t[on]
+        # All samples of a road lead to one place, except where it passes above itself.
+        _, first = np.unique(np.column_stack([road, s.round(3)]), axis=0, return_index=True)
+        return road[first], s[first], t[first]
+
     @cached_property
     def _overlaps(self) -> Overlaps:
         return Overlaps(self._tables, self.sample_points, self._road, self._from_samples)

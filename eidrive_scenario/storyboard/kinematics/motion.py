@@ -146,8 +146,8 @@ class Motion(MotionState):
         An actor outside the road that does not point along it keeps its heading.
         """
         self._crosses = self._rests = False
-        hint = self._location
-        location = self.roads.locate_at(self._pose.x, self._pose.y, hint) if self.roads is not None else None
+        x, y, z, h, _, _ = self._pose
+        location = self.roads.locate_pose(x, y, h, z, self._location) if self.roads is not None else None
         self._set_location(location)
         if self._location is not None and self.roads is not None and abs(math.cos(self._heading)) < ACROSS:
             self._crosses = not self.roads.on_road(self._location)

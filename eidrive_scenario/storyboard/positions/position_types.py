@@ -12,7 +12,7 @@ from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route
 from eidrive_scenario.storyboard.context.contexts import ConditionContext
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
-from eidrive_scenario.storyboard.kinematics.trajectory_sampling import on_surface
+from eidrive_scenario.storyboard.kinematics.trajectory_sampling import laid_on_lane
 
 
 def oriented(orientation: model.Orientation | None, base: Pose) -> Pose:
@@ -68,7 +68,8 @@ def world_position(frame: model.WorldPosition, context: ConditionContext) -> Res
     """Resolve a WorldPosition; without z it is on the road."""
     side = -1.0 if left_handed(context) else 1.0
     h, p, r = side * (frame.h or 0.0), side * (frame.p or 0.0), frame.r or 0.0
-    return on_ground(context, Pose(frame.x, side * frame.y, frame.z or 0.0, h, p, r), z_given=frame.z is not None)
+    pose = Pose(frame.x, side * frame.y, frame.z or 0.0, h, p, r)
+    return on_ground(context, pose, z_given=frame.z is not None, h_given=frame.h is not None)
 
 
 def relative_world_position(frame: model.RelativeWorldPosition, context: ConditionContext) -> ResolvedPosition:
@@ -107,18 +108,20 @@ def _in_standard_axes(orientation: model.Orientation | None, side: float) -> mod
     return replace(orientation, h=side * (orientation.h or 0.0), p=side * (orientation.p or 0.0))
 
 
-def on_ground(context: ConditionContext, pose: Pose, *, z_given: bool, near: str | None = None) -> ResolvedPosition:
+def on_ground(
+    context: ConditionContext, pose: Pose, *, z_given: bool, h_given: bool = True, near: str | None = None
+) -> ResolvedPosition:
     """Return the position of a pose, on the road if there is one; the search begins at the actor `near`."""
     if context.roads is None:
         return ResolvedPosition(pose)
-    level, here = on_surface(pose, context.roads, None if near is None else context.location(near))
-    if not z_given:
+    hint, height = (None, pose.z if z_given else None) if near is None else (context.location(near), pose.z)
+    here = context.roads.locate_pose(pose.x, pose.y, pose.h if h_given else None, height, hint)
+    if here is not None and not z_given:
+        level = laid_on_lane(pose, context.roads, here)
         pose = level._replace(p=pose.p or level.p, r=pose.r or level.r)
     return ResolvedPosition(pose, here)
 
 
-HEIGHT_LIMIT = 1e4
-"""Height above and below all roads [m]."""
 LEVEL_SEPARATION = 0.5
 """Maximum difference in height of roads on one level [m]."""
 
@@ -136,7 +139,9 @@ def geo_position(frame: model.GeoPosition, context: ConditionContext) -> Resolve
     else:
         level = height_of_level(frame, roads, x, y)
     z = level if frame.altitude is None else (level or 0.0) + frame.altitude
-    here = roads.locate_at(x, y, z=level)
+    given = frame.orientation
+    heading = None if given is None or given.type is model.ReferenceContext.RELATIVE else given.h
+    here = roads.locate_pose(x, y, heading, level)
     base = roads.pose(here) if here is not None else Pose(x, y, 0.0, 0.0, 0.0, 0.0)
     return ResolvedPosition(oriented(frame.orientation, base._replace(x=x, y=y, z=base.z if z is None else z)), here)
 
@@ -157,13 +162,12 @@ def height_of_level(frame: model.GeoPosition, roads: RoadNetwork, x: float, y: f
 
     0 is the top-most road, -1 the next one below (1.3.1, GeoPosition). Raise ScenarioError if the level does not exist.
     """
-    low, high = (_surface(roads, x, y, end) for end in (-HEIGHT_LIMIT, HEIGHT_LIMIT))
-    if low is None or high is None:
+    nearest = roads.locate_at(x, y)
+    if nearest is None:
         return None
-    levels = [low]
-    for step in range(1, math.ceil((high - low) / LEVEL_SEPARATION) + 1):
-        height = _surface(roads, x, y, low + step * LEVEL_SEPARATION)
-        if height is not None and height > levels[-1] + LEVEL_SEPARATION:
+    levels: list[float] = []
+    for height in sorted(roads.pose(location).z for location in roads.locations_at(x, y) or [nearest]):
+        if not levels or height > levels[-1] + LEVEL_SEPARATION:
             levels.append(height)
     below = -(frame.vertical_road_selection or 0)
     if not 0 <= below < len(levels):
@@ -171,12 +175,6 @@ def height_of_level(frame: model.GeoPosition, roads: RoadNetwork, x: float, y: f
         hint = f"got {-below}; expected {1 - len(levels)} to 0, the top-most"
         raise ScenarioError(Diagnostic.at(frame, message, hint))
     return levels[-1 - below]
-
-
-def _surface(roads: RoadNetwork, x: float, y: float, z: float) -> float | None:
-    """Return the height of the road that is nearest to a height [m]; None without a road."""
-    here = roads.locate([x], [y], [z]).location(0)
-    return None if here is None else roads.pose(here).z
 
 
 def _angles(frame: model.GeoPosition, context: ConditionContext) -> tuple[float, float]:

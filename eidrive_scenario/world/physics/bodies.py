@@ -228,19 +228,27 @@ class ScriptedBody(Body):
 class GroundUnder:
     """Height and slope of the ground below one vehicle, with the lane of its last position."""
 
-    def __init__(self, roads: RoadNetwork | None, height: float = 0.0) -> None:
+    def __init__(self, roads: RoadNetwork | None) -> None:
         self._roads = roads
         self._last: LaneLocation | None = None
-        self._height = height
+        self._height = 0.0
 
-    def at(self, x: float, y: float, yaw: float) -> tuple[float, float, float]:
+    def at(self, x: float, y: float, yaw: float, z: float | None = None) -> tuple[float, float, float]:
         """Return height z [m], pitch and roll [rad] of a body at x, y with that heading.
 
         Outside the road the ground is level at the height at which the vehicle left the road.
+
+        z  height near which the vehicle is after a teleport [m]
         """
-        if self._roads is not None:
-            self._last = self._roads.locate_at(x, y, self._last)
-        if self._roads is None or self._last is None:
+        if z is not None:
+            self._height = z
+        if self._roads is None:
+            return self._height, 0.0, 0.0
+        if z is not None:
+            self._last = self._roads.locate_pose(x, y, yaw, z)
+        else:
+            self._last = self._roads.locate_at(x, y, self._last, self._height)
+        if self._last is None:
             return self._height, 0.0, 0.0
         pose = self._roads.road_pose_at(self._last.road, self._last.s, self._last.t)
         pose = pose.turned(yaw - pose.h)
@@ -284,7 +292,7 @@ class DrivenBody(Body):
 
     def teleport(self, placement: Placement) -> None:
         """Move to the placement, rolling straight ahead. The ground determines height, pitch and roll."""
-        z, pitch, roll = self._ground.at(placement.x, placement.y, placement.yaw)
+        z, pitch, roll = self._ground.at(placement.x, placement.y, placement.yaw, placement.z)
         self._pose(placement.x, placement.y, z, placement.yaw, pitch, roll)
         self.speed, self.yaw_rate, self.acceleration = placement.speed, 0.0, (0.0, 0.0, 0.0)
         self.velocity = self.velocity_before = self._along_heading(placement.speed)

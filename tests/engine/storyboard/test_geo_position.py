@@ -23,14 +23,17 @@ NORTHING = 5_316_300.0
 
 @pytest.fixture
 def globe(context: RuntimeContext) -> RuntimeContext:
-    """Road to the north from about (0, 0) at z = 10, below another one at z = 17, in shifted coordinates."""
+    """Road to the north from about (0, 0) at z = 10, below another one at z = 17, in shifted coordinates.
+
+    A third road is 400 m beside them on a hill at z = 60.
+    """
     reference = "<geoReference>+proj=utm +zone=32 +datum=WGS84</geoReference>"
-    lower, upper = (
-        road_xml(number, length=400.0, hdg=math.pi / 2, profiles=elevation_xml(z), lanes=lanes_xml(0, 1, 8))
-        for number, z in (("1", 10), ("2", 17))
+    lower, upper, beside = (
+        road_xml(number, length=400.0, x=x, hdg=math.pi / 2, profiles=elevation_xml(z), lanes=lanes_xml(0, 1, 8))
+        for number, x, z in (("1", 0, 10), ("2", 0, 17), ("3", 400, 60))
     )
     roads = RoadNetwork.parse(
-        map_xml(lower, upper, header=f'{reference}<offset x="499996" y="{NORTHING}" z="100" hdg="0"/>')
+        map_xml(lower, upper, beside, header=f'{reference}<offset x="499996" y="{NORTHING}" z="100" hdg="0"/>')
     )
     return RuntimeContext(context.scenario, roads, dt=0.1, seed=0)
 

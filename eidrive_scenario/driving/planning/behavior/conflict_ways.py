@@ -17,8 +17,7 @@ from eidrive_scenario.driving.planning.behavior.right_of_way import (
     Passage,
     in_turn,
 )
-from eidrive_scenario.perception.traffic_lights import OTHER_LEVEL
-from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads import OTHER_LEVEL, RoadNetwork
 from eidrive_scenario.roads.model.location import LaneKey
 from eidrive_scenario.roads.objects import crosswalks
 

@@ -14,7 +14,7 @@ from eidrive_scenario.base.detections import VULNERABLE, Detections
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.planning.behavior.right_of_way import Course
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
-from eidrive_scenario.perception.traffic_lights import OTHER_LEVEL
+from eidrive_scenario.roads import OTHER_LEVEL
 
 ON_FOOT = frozenset({"pedestrian"})
 STILL = 0.5

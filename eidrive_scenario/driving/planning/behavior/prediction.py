@@ -19,9 +19,8 @@ from eidrive_scenario.driving.planning.behavior.right_of_way import (
     Passage,
     in_turn,
 )
-from eidrive_scenario.driving.planning.path import ALIGNED
 from eidrive_scenario.driving.planning.signal_stops import COMFORTABLE, PERCEPTION
-from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads import ALIGNED, RoadNetwork
 
 STANDING = 0.3
 """Speed below which an object is predicted to stand [m/s]; the direction of a slower one is noise."""

@@ -136,7 +136,7 @@ class ReferenceLine:
             return limits
         location = None
         for index, (x, y) in enumerate(self.points.tolist()):
-            location = roads.locate_at(x, y, location, reach=5.0)
+            location = roads.locate_at(x, y, location, self._height(index), reach=5.0)
             if location is not None:
                 limits[index] = assumed_speed(roads.speed_limit(location.road, location.s, location.lane))
         return limits
@@ -150,6 +150,9 @@ class ReferenceLine:
     def heights(self) -> Array | None:
         """Heights of the road at the points (M,) [m]; None if all roads are level."""
         return path_heights(self.path, self._roads, self._z)
+
+    def _height(self, index: int) -> float | None:
+        return None if self.heights is None else float(self.heights[index])
 
     def along_of(self, distance: float) -> float:
         """Return the distance along the line at a distance along its path [m]."""
@@ -221,7 +224,7 @@ class ReferenceLine:
         if roads is None:
             return None
         x, y = self.points[index].tolist()
-        location = self._location = roads.locate_at(x, y, self._location, reach=5.0)
+        location = self._location = roads.locate_at(x, y, self._location, self._height(index), reach=5.0)
         if location is None:
             return None
         road = roads.road(location.road)

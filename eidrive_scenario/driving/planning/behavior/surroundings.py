@@ -15,7 +15,7 @@ from eidrive_scenario.driving.planning.behavior.prediction import Prediction
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import Passage
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
-from eidrive_scenario.perception.traffic_lights import OTHER_LEVEL
+from eidrive_scenario.roads import OTHER_LEVEL
 
 LARGEST_LATERAL_ERROR = 0.75
 """Maximum enlargement of an object to the side [m]: half of what a lane leaves beside a car, else neighbors block."""

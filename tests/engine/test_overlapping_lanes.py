@@ -1,0 +1,134 @@
+"""Lane of a vehicle at a pose where lanes overlap: in a junction, and on or below a bridge."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from opendrive_xml import elevation_xml, map_xml, road_xml
+from openscenario_xml import agent_xml, object_xml, road_file_xml, scenario_xml
+from planned_drive import detections
+from signal_street import CAR
+from storyboard_xml import end_xml, init_xml, lane_position_xml, speed_xml, teleport_xml
+
+from eidrive_scenario.driving.planning.route_planner import RoutePlanner
+from eidrive_scenario.driving.settings import AgentSettings
+from eidrive_scenario.extensions.library import library_path
+from eidrive_scenario.openscenario import load_scenario, model
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.readings import EgoState
+from eidrive_scenario.simulation import Simulation
+from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
+from eidrive_scenario.storyboard.kinematics.motion import Motion
+from eidrive_scenario.storyboard.positions.resolution import resolve_position
+
+
+def state(x: float, y: float, yaw: float, z: float = 0.0) -> EgoState:
+    return EgoState(0.0, np.array([x, y, z]), yaw, 0.0, 0.0, 8.0, 0.0, 0.0)
+
+
+def end_of_plan(roads: RoadNetwork, ego: EgoState) -> np.ndarray:
+    planner = RoutePlanner(AgentSettings(target_speed=8.0), CAR, roads, dt=0.05, seed=0)
+    return np.asarray(planner.plan(ego, detections(0.0), None, 0.0).points[-1])
+
+
+@pytest.fixture(scope="module")
+def junction() -> RoadNetwork:
+    """Return a junction about (42, 1.75) with a lane of 3.5 m in each direction on its four arms."""
+    return RoadNetwork.load(library_path() / "roads/four_way_junction.xodr")
+
+
+@pytest.mark.parametrize("turn", [-0.3, 0.0, 0.3])
+@pytest.mark.parametrize(
+    ("x", "y", "yaw"),
+    [(42.0, 0.0, 0.0), (42.0, 3.5, math.pi), (43.75, 1.75, math.pi / 2.0), (40.25, 1.75, -math.pi / 2.0)],
+)
+def test_vehicle_in_a_junction_follows_the_lane_along_its_heading(
+    junction: RoadNetwork, x: float, y: float, yaw: float, turn: float
+) -> None:
+    """The connecting roads straight ahead lead from each arm to the opposite one, whose lane is straight on."""
+    place = junction.locate_pose(x, y, yaw + turn, 0.0, drivable=True)
+    assert place is not None
+    end = end_of_plan(junction, state(x, y, yaw + turn))
+    ahead, aside = math.cos(yaw), math.sin(yaw)
+    assert (end[0] - x) * ahead + (end[1] - y) * aside > 30.0
+    assert abs((end[1] - y) * ahead - (end[0] - x) * aside) < 0.2
+
+
+@pytest.mark.parametrize("teleports", [True, False], ids=["WorldPosition", "end of a trajectory"])
+def test_scripted_vehicle_in_a_junction_follows_the_lane_along_its_heading(
+    junction: RoadNetwork, teleports: bool
+) -> None:
+    """It is on the center of a lane, which it follows for 50 m."""
+    connecting = [road for road in junction.roads.values() if road.junction_id is not None]
+    assert len(connecting) == 12
+    for road in connecting:
+        for share in (0.3, 0.5, 0.7):
+            place = junction.location(road.id, -1, share * road.length)
+            pose = junction.pose(place)
+            motion = Motion(junction)
+            if teleports:
+                context = RuntimeContext(load_scenario(scenario_xml()), junction, dt=0.1, seed=0)
+                position = model.WorldPosition(x=pose.x, y=pose.y, h=pose.h)
+                motion.teleport(resolve_position(model.Position(world_position=position), context))
+            else:
+                motion.move_to(pose, land=True)
+            motion.set_speed(5.0)
+            end = [motion.step(0.1) for _ in range(101)][-1]
+            ahead = junction.advance(place, 50.0)
+            assert ahead is not None
+            expected = junction.pose(ahead)
+            assert math.hypot(end.x - expected.x, end.y - expected.y) < 0.3, place
+
+
+@pytest.mark.parametrize(("bridge", "ground"), [("1", "2"), ("2", "1")])
+def test_vehicle_where_a_bridge_crosses_follows_its_own_road(bridge: str, ground: str) -> None:
+    """Road 1 leads along x, road 2 along y. Their right lanes overlap at (150 + 1.75, -1.75)."""
+    heights = {bridge: 6.5, ground: 0.0}
+    along = road_xml("1", length=300.0, profiles=elevation_xml(heights["1"], 0.0))
+    across = road_xml(
+        "2", length=300.0, x=150.0, y=-150.0, hdg=math.pi / 2.0, profiles=elevation_xml(heights["2"], 0.0)
+    )
+    roads = RoadNetwork.parse(map_xml(along, across))
+    for road, yaw in (("1", 0.0), ("2", math.pi / 2.0)):
+        for turn in (-0.7, 0.0, 0.7):
+            place = roads.locate_pose(151.75, -1.75, yaw + turn, heights[road], drivable=True)
+            assert place is not None
+            assert place.road == road
+
+
+@pytest.mark.parametrize("driven", [False, True])
+@pytest.mark.parametrize("position", ["lane", "world", "world without z"])
+@pytest.mark.parametrize("road", ["1", "2"])
+def test_vehicle_that_starts_where_a_bridge_crosses_keeps_its_height(
+    tmp_path: Path, road: str, position: str, driven: bool
+) -> None:
+    """Road 1 leads along x, road 2 along y and 6.5 m above; the vehicle starts where their right lanes overlap."""
+    lower = road_xml("1", length=300.0)
+    upper = road_xml("2", length=300.0, x=150.0, y=-150.0, hdg=math.pi / 2.0, profiles=elevation_xml(6.5, 0.0))
+    (tmp_path / "bridge.xodr").write_text(map_xml(lower, upper))
+    x, y, z, yaw = (151.0, -1.75, 0.0, 0.0) if road == "1" else (151.75, -1.2, 6.5, math.pi / 2.0)
+    height = f'z="{z}"' if position == "world" else ""
+    place = f'<WorldPosition x="{x}" y="{y}" h="{yaw}" {height}/>'
+    if position == "lane":
+        place = lane_position_xml(-1, x if road == "1" else y + 150.0, road)
+    path = tmp_path / "bridge.xosc"
+    path.write_bytes(
+        scenario_xml(
+            road=road_file_xml("bridge.xodr"),
+            entities=object_xml("Ego", controller=agent_xml(detector="oracle") if driven else ""),
+            init=init_xml("Ego", teleport_xml(place), speed_xml(5)),
+            stop=end_xml(2.0),
+        )
+    )
+    poses, end = [], None
+    with Simulation(path) as simulation:
+        while end is None:
+            frame, end = simulation.tick()
+            poses.append(frame.view.position[0].tolist())
+    assert len(poses) > 30
+    assert [pose[2] for pose in poses] == pytest.approx([z] * len(poses), abs=0.05)
+    aside = [pose[1] - y if road == "1" else pose[0] - x for pose in poses]
+    assert aside == pytest.approx([0.0] * len(poses), abs=0.2)
