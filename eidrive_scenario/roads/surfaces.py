@@ -5,6 +5,7 @@ Road marks are painted strips along lane edges, and painted areas.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
@@ -251,7 +252,8 @@ def _lane_markings(network: RoadNetwork, road: Road, section: LaneSection, cuts:
         for mark, following in zip(marks, (*marks[1:], None), strict=False):
             start = section.s + max(mark.s_offset, 0.0)
             end = section.end if following is None else min(section.s + following.s_offset, section.end)
-            if mark.type in PAINTED and end - start > 1e-3:
+            is_painted = mark.type in PAINTED or (mark.type == "custom" and mark.lines)
+            if is_painted and end - start > 1e-3:
                 kind = "marking_yellow" if mark.color == "yellow" else "marking_white"
                 for s, t, width in _mark_strips(road, section, lane, mark, start, end, cuts):
                     low, high = (_points(network, road, s.ravel(), (t + k * width).ravel()) for k in (-0.5, 0.5))
@@ -265,16 +267,20 @@ def _mark_strips(
 ) -> Iterator[tuple[Array, Array, float]]:
     """Yield paint along a road: s and t (K, P) of K pieces with P points each, and width [m]."""
     for offset, width, dash, gap, phase in _lines(lane, mark):
-        period = dash + gap
-        if dash > 0.0 and gap > 0.0 and period > FINEST and end - start < MOST_DASHES * period:
+        period, low, high = dash + gap, start, end
+        if math.isinf(gap):
+            low, high = start + phase, min(start + phase + dash, end)
+        if dash > 0.0 and 0.0 < gap < math.inf and period > FINEST and end - start < MOST_DASHES * period:
             starts = np.arange(start + (phase if phase >= 0.0 else phase % period), end, period)
             if not starts.size:
                 continue
             bent = any(abs(road.reference.at(float(s)).curvature) > CURVED for s in (start, 0.5 * (start + end), end))
             share = np.linspace(0.0, 1.0, 4 if bent else 2)
             s = starts[:, None] + (np.minimum(starts + dash, end) - starts)[:, None] * share
+        elif low < high:
+            s = np.array([low, *(cut for cut in cuts if low < cut < high), high])[None, :]
         else:
-            s = np.array([start, *(cut for cut in cuts if start < cut < end), end])[None, :]
+            continue
         yield s, _edge(road, section, lane, s) + offset, width
 
 
@@ -283,13 +289,12 @@ def _lines(lane: Lane, mark: RoadMark) -> list[tuple[float, float, float, float,
 
     A solid line has a gap of 0.
     """
-    lines = [
-        (line.t_offset, line.width, line.length, line.space, line.s_offset)
-        for line in mark.lines
-        if line.length > 0.0 or line.space > 0.0
-    ]
-    if lines:
-        return lines
+    if any(line.length > 0.0 or line.space > 0.0 for line in mark.lines):
+        return [
+            (line.t_offset, line.width, line.length, line.space, line.s_offset)
+            for line in mark.lines
+            if line.length > 0.0 or line.space == 0.0
+        ]
     words = mark.type.split()
     if mark.type == "botts dots":
         return [(0.0, 0.1, 0.1, 1.2, 0.0)]

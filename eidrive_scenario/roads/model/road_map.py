@@ -108,7 +108,7 @@ class Header(msgspec.Struct, frozen=True):
 
 
 class RoadMarkLine(msgspec.Struct, frozen=True):
-    """Line of a road mark with an explicit pattern."""
+    """Line of a road mark: dashes of a length and a space after each; 0 for a solid line, inf for a single dash."""
 
     length: float
     space: float

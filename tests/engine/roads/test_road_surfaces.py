@@ -54,6 +54,39 @@ def test_broken_solid_center_line_has_its_broken_line_left() -> None:
     assert len(left) == 2 * 12
 
 
+@pytest.mark.parametrize(
+    ("lines", "expected"),
+    [
+        ('<explicit><line sOffset="2" length="5" tOffset="0.3" width="0.4"/></explicit>', [(12.0, 17.0, 0.1, 0.5)]),
+        (
+            '<type name="" width="0.2"><line length="5" space="95" tOffset="-0.3" sOffset="0" width="0.2"/>'
+            '<line length="0" space="0" tOffset="0.3" sOffset="0" width="0.2"/></type>',
+            [(10.0, 15.0, -0.4, -0.2), (10.0, 100.0, 0.2, 0.4)],
+        ),
+        (
+            '<type name="" width="0.2"><line length="90" space="0" tOffset="0" sOffset="0"/></type>'
+            '<explicit><line sOffset="89" length="5" tOffset="0.5"/></explicit>',
+            [(10.0, 100.0, -0.1, 0.1), (99.0, 100.0, 0.4, 0.6)],
+        ),
+    ],
+    ids=["explicit", "line of length 0 beside another one", "type and explicit"],
+)
+@pytest.mark.parametrize("kind", ["custom", "broken"])
+def test_lines_of_a_road_mark_are_drawn_where_they_are_specified(
+    kind: str, lines: str, expected: list[tuple[float, float, float, float]]
+) -> None:
+    """The mark of lane 0 begins at 10 m. A line of a single dash is relative to it (OpenDRIVE 1.8, explicit)."""
+    mark = f'<roadMark sOffset="10" type="{kind}" width="0.2">{lines}</roadMark>'
+    roads = RoadNetwork.parse(map_xml(road_xml(lanes=section_xml(right=lane_xml(-1, 4), center=mark))))
+    mesh = by_kind(roads)["marking_white"]
+    x, y = mesh.vertices[:, 0], mesh.vertices[:, 1]
+    for begin, end, right, left in expected:
+        inside = (y > right - 1e-6) & (y < left + 1e-6)
+        assert (x[inside].min(), x[inside].max()) == pytest.approx((begin, end))
+    widths = sum((end - begin) * (left - right) for begin, end, right, left in expected)
+    assert area(mesh) == pytest.approx(widths)
+
+
 @pytest.mark.parametrize("name", ["coop_1", "coop_2"])
 def test_ground_faces_point_upwards(library: Path, name: str) -> None:
     for mesh in surface_meshes(RoadNetwork.load(library / f"{name}.xodr")):
