@@ -120,7 +120,7 @@ class AgentSettings(Settings):
     clock_drift     rate error of the station clock [parts per million]
     asn1_files      ASN.1 modules that determine the sizes of messages, relative to the scenario file
     target_speed    speed without a request of the storyboard; None keeps the initial speed [m/s]
-    follow_speed_limit  whether the speed limit of the lane replaces the initial speed; 13.9 m/s without a stated limit
+    follow_speed_limit  whether the speed limit, or usual speed, of the lane replaces the initial speed
     vehicle_controller  name of the controller that follows the trajectories of the planner
     vehicle_controller_settings  settings of the vehicle controller
     planner_settings  settings of the selected planner; a property with the name of a setting is accepted as well

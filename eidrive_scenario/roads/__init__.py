@@ -16,6 +16,7 @@ from eidrive_scenario.roads.model.road_map import SignalController as SignalCont
 from eidrive_scenario.roads.model.road_map import SignalPlace as SignalPlace
 from eidrive_scenario.roads.network import ALIGNED as ALIGNED
 from eidrive_scenario.roads.network import OTHER_LEVEL as OTHER_LEVEL
+from eidrive_scenario.roads.network import USUAL_SPEED as USUAL_SPEED
 from eidrive_scenario.roads.network import RoadNetwork as RoadNetwork
 from eidrive_scenario.roads.network import fastest as fastest
 from eidrive_scenario.roads.network import fewest_junctions as fewest_junctions

@@ -36,7 +36,6 @@ from eidrive_scenario.roads.routing.graph import (
     Cost,
     LaneWays,
     RouteError,
-    assumed_speed,
     build_ways,
     find_lanes,
     lane_key,
@@ -49,6 +48,11 @@ if TYPE_CHECKING:
     from eidrive_scenario.roads.routing.graph import LaneGraph
 
 
+FREE_SPEED = 130.0 / 3.6
+"""Assumed speed where the speed is not limited [m/s]: the recommended one on German motorways."""
+USUAL_SPEED = 50.0 / 3.6
+USUAL_SPEEDS = {"motorway": FREE_SPEED, "rural": 100.0 / 3.6, "lowSpeed": 30.0 / 3.6}
+"""Assumed speeds on roads of a type, and on others, without a stated limit [m/s]: the general limits in Germany."""
 KEPT = 2
 """Maximum number of road networks that are kept for the next run."""
 OTHER_LEVEL = 3.5
@@ -192,13 +196,21 @@ class RoadNetwork:
             own = [limit for start, limit in lane.speeds if start <= s - section.s + 1e-9]
             if own:
                 return own[-1]
-        kinds = [kind for kind in road.types if kind.s <= s + 1e-9]
-        return kinds[-1].speed if kinds else None
+        kind = road.type_at(s)
+        return None if kind is None else kind.speed
+
+    def assumed_speed(self, road_id: str, s: float, lane_id: int | None = None) -> float:
+        """Return the speed of traffic at s [m/s]: the limit, else that which is usual on a road of this type."""
+        limit = self.speed_limit(road_id, s, lane_id)
+        if limit:
+            return min(limit, FREE_SPEED)
+        kind = self.road(road_id).type_at(s)
+        return USUAL_SPEED if kind is None else USUAL_SPEEDS.get(kind.type, USUAL_SPEED)
 
     def usual_speed(self, key: LaneKey) -> float:
-        """Return the speed of traffic that is assumed in the middle of a lane by its speed limit [m/s]."""
+        """Return the speed of traffic that is assumed in the middle of a lane [m/s]."""
         section = self.road(key.road).sections[key.section]
-        return assumed_speed(self.speed_limit(key.road, 0.5 * (section.s + section.end), key.lane))
+        return self.assumed_speed(key.road, 0.5 * (section.s + section.end), key.lane)
 
     def on_road(self, location: LaneLocation) -> bool:
         """Return True if the location is within the width of its lane."""
@@ -530,7 +542,7 @@ class RoadNetwork:
         return None if runs is None else lanes_between(self.roads, self.links, a, b, runs)
 
     def _usual_speed(self, road: str) -> float:
-        return assumed_speed(self.speed_limit(road, 0.5 * self.road(road).length))
+        return self.assumed_speed(road, 0.5 * self.road(road).length)
 
     def bounds(self) -> tuple[float, float, float, float]:
         """Return the bounding rectangle of all lane centers: minimum x and y, maximum x and y [m]; 0 without lanes."""

@@ -26,8 +26,7 @@ from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.extensions.settings import parse_settings
-from eidrive_scenario.roads import LaneLocation, RoadNetwork, RouteError
-from eidrive_scenario.roads.routing.graph import assumed_speed
+from eidrive_scenario.roads import USUAL_SPEED, LaneLocation, RoadNetwork, RouteError
 from eidrive_scenario.sensing.readings import EgoState, SignalReading
 from eidrive_scenario.world.actor import ActorSpec
 
@@ -189,9 +188,9 @@ class RoutePlanner(Planner):
             x, y, _ = ego.position.tolist()
             before = self._location
             here = _lane_below(self.roads, ego) if before is None else self.roads.locate_at(x, y, before)
-            limit = None if here is None else self.roads.speed_limit(here.road, here.s, here.lane)
             self._location = here
-            return min(assumed_speed(limit), self.spec.max_speed)
+            usual = USUAL_SPEED if here is None else self.roads.assumed_speed(here.road, here.s, here.lane)
+            return min(usual, self.spec.max_speed)
         if self._first_speed is None:
             self._first_speed = max(ego.speed, 0.0)
         return self._first_speed

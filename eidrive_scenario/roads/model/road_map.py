@@ -230,6 +230,10 @@ class Road:
     line: int | None = None
     section_starts: tuple[float, ...] = field(default=(), repr=False)
 
+    def type_at(self, s: float) -> RoadType | None:
+        """Return the type of the road at s, or None if the map states none."""
+        return next((kind for kind in reversed(self.types) if kind.s <= s + 1e-9), None)
+
     @cached_property
     def directions(self) -> Mapping[int, int]:
         """+1 if traffic drives in the direction of s, else -1, by lane id; +1 for lane 0.

@@ -225,6 +225,26 @@ def test_speed_limit_of_lane_overrides_road() -> None:
     assert network.speed_limit("1", 90.0) is None
 
 
+@pytest.mark.parametrize(
+    ("kind", "expected"),
+    [
+        ('<type s="0" type="motorway"/>', 130.0),
+        ('<type s="0" type="motorway"><speed max="no limit"/></type>', 130.0),
+        ('<type s="0" type="motorway"><speed max="80" unit="km/h"/></type>', 80.0),
+        ('<type s="0" type="rural"/>', 100.0),
+        ('<type s="0" type="lowSpeed"><speed max="undefined"/></type>', 30.0),
+        ('<type s="0" type="town"/>', 50.0),
+        ('<type s="50" type="motorway"/>', 50.0),
+        ("", 50.0),
+    ],
+)
+def test_assumed_speed_is_the_limit_or_that_of_the_road_type(kind: str, expected: float) -> None:
+    """Without a limit it is the general one of German law: 50 km/h in towns, 100 outside, 130 recommended, zone 30."""
+    network = RoadNetwork.parse(map_xml(road_xml(extra=kind)))
+    assert network.assumed_speed("1", 10.0) == pytest.approx(expected / 3.6)
+    assert network.assumed_speed("1", 10.0, -1) == pytest.approx(expected / 3.6)
+
+
 SIGNALS = (
     '<signals><signal s="90" t="-4" id="7" name="light" dynamic="yes" orientation="+" zOffset="5" country="OpenDRIVE" '
     'type="1000001" subtype="-1" hOffset="0.1"><validity fromLane="-1" toLane="-1"/></signal></signals>'

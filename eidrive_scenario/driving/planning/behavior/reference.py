@@ -15,7 +15,6 @@ from eidrive_scenario.driving.planning.path import PlannedPath, path_heights
 from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork
 from eidrive_scenario.roads.geometry.poses import lane_t
 from eidrive_scenario.roads.model.road_map import LaneSection
-from eidrive_scenario.roads.routing.graph import assumed_speed
 
 NARROWEST = 2.5
 """Minimum width of a lane to which the vehicle changes [m]."""
@@ -138,7 +137,7 @@ class ReferenceLine:
         for index, (x, y) in enumerate(self.points.tolist()):
             location = roads.locate_at(x, y, location, self._height(index), reach=5.0)
             if location is not None:
-                limits[index] = assumed_speed(roads.speed_limit(location.road, location.s, location.lane))
+                limits[index] = roads.assumed_speed(location.road, location.s, location.lane)
         return limits
 
     @property
