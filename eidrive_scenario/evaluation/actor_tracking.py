@@ -65,8 +65,8 @@ class LaneTracker:
 
     def center(self, view: WorldView, row: int) -> LaneLocation | None:
         """Return the lane at the center of an actor, also beyond the end of its road; None beside all lanes."""
-        x, y, *_ = view.plain_boxes[row]
-        location = self.roads.locate_at(x, y, self._hint, view.states[row].z)
+        x, y, *_, yaw = view.plain_boxes[row]
+        location = self.roads.locate_pose(x, y, yaw, view.states[row].z, self._hint)
         self._hint = location
         return location if location is not None and self.roads.on_road(location) else None
 

@@ -179,8 +179,8 @@ class LaneCoordinates:
 
     def _locate(self, view: WorldView, row: int) -> LaneLocation | None:
         name = view.names[row]
-        x, y, z, *_ = view.plain_boxes[row]
-        location = self._roads.locate_at(x, y, self._hints.get(name), z)
+        x, y, *_, yaw = view.plain_boxes[row]
+        location = self._roads.locate_pose(x, y, yaw, view.states[row].z, self._hints.get(name))
         self._hints[name] = location
         return location
 

@@ -403,6 +403,9 @@ class RoadNetwork:
         def deviation(location: LaneLocation) -> float:
             return abs(location.offset) + FRONT * angle(location)
 
+        is_certain = self.is_level or (z is not None and self.is_on_level(nearest, z))
+        if is_certain and self.road(nearest.road).junction_id is None:
+            return nearest
         below = self.locations_at(x, y)
         if z is not None:
             below = [location for location in below if self.is_on_level(location, z)]
@@ -415,7 +418,8 @@ class RoadNetwork:
         aligned = [location for location in below if angle(location) <= ALIGNED]
         # Lanes that part later coincide at first: as on the default route, the one on the road with the smallest turn.
         best = min(aligned, key=lambda location: (round(deviation(location), 3), self._turn(location)), default=nearest)
-        return nearest if hint is not None and deviation(nearest) <= deviation(best) + LEAST_GAIN else best
+        stays = hint is not None and deviation(nearest) <= deviation(best) + LEAST_GAIN
+        return nearest if stays or best[:2] == nearest[:2] else best
 
     def _turn(self, location: LaneLocation) -> float:
         road = self.road(location.road)

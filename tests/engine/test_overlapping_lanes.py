@@ -17,7 +17,7 @@ from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.openscenario import load_scenario, model
-from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads import Road, RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
@@ -38,6 +38,10 @@ def end_of_plan(roads: RoadNetwork, ego: EgoState) -> np.ndarray:
 def junction() -> RoadNetwork:
     """Return a junction about (42, 1.75) with a lane of 3.5 m in each direction on its four arms."""
     return RoadNetwork.load(library_path() / "roads/four_way_junction.xodr")
+
+
+def connecting_roads(junction: RoadNetwork) -> list[Road]:
+    return [road for road in junction.roads.values() if road.junction_id is not None]
 
 
 @pytest.mark.parametrize("turn", [-0.3, 0.0, 0.3])
@@ -62,9 +66,7 @@ def test_scripted_vehicle_in_a_junction_follows_the_lane_along_its_heading(
     junction: RoadNetwork, teleports: bool
 ) -> None:
     """It is on the center of a lane, which it follows for 50 m."""
-    connecting = [road for road in junction.roads.values() if road.junction_id is not None]
-    assert len(connecting) == 12
-    for road in connecting:
+    for road in connecting_roads(junction):
         for share in (0.3, 0.5, 0.7):
             place = junction.location(road.id, -1, share * road.length)
             pose = junction.pose(place)
@@ -81,6 +83,29 @@ def test_scripted_vehicle_in_a_junction_follows_the_lane_along_its_heading(
             assert ahead is not None
             expected = junction.pose(ahead)
             assert math.hypot(end.x - expected.x, end.y - expected.y) < 0.3, place
+
+
+def test_location_in_a_junction_moves_to_the_lane_that_the_vehicle_follows(junction: RoadNetwork) -> None:
+    """Each of the twelve connecting roads coincides with two others at first, of which one is passed before."""
+    for road in connecting_roads(junction):
+        location = None
+        for s in np.arange(0.0, 0.6 * road.length, 0.5).tolist():
+            pose = junction.pose(junction.location(road.id, -1, s))
+            location = junction.locate_pose(pose.x, pose.y, pose.h, pose.z, location)
+        assert location is not None
+        assert location.road == road.id
+
+
+def test_vehicle_handed_over_in_a_junction_stays_on_its_route(junction: RoadNetwork) -> None:
+    """At 2 m after the start of a connecting road the lanes to all directions coincide within centimeters."""
+    for road in connecting_roads(junction):
+        start, end = junction.location(road.id, -1, 2.0), junction.location(road.id, -1, road.length)
+        motion = Motion(junction)
+        motion.set_route(junction.route(start, end))
+        motion.set_observed_state(junction.pose(start), 5.0)
+        motion.snap_to_lane()
+        assert motion.location is not None
+        assert motion.location.road == road.id
 
 
 @pytest.mark.parametrize(("bridge", "ground"), [("1", "2"), ("2", "1")])

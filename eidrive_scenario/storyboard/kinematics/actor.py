@@ -218,8 +218,11 @@ class Actor:
     def location(self, roads: RoadNetwork, tick: int) -> LaneLocation | None:
         """Return its lane location, None without a road nearby. It is computed once per tick."""
         if self._location_tick != tick:
-            pose = self.motion.pose
-            self._location = roads.locate_at(pose.x, pose.y, self.motion.location or self._location)
+            (x, y, z, h, _, _), of_motion = self.motion.pose, None if self.driven else self.motion.location
+            if of_motion is not None:
+                self._location = roads.locate_at(x, y, of_motion)
+            else:
+                self._location = roads.locate_pose(x, y, h, z, self._location)
             self._location_tick = tick
         return self._location
 

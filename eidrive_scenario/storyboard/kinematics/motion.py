@@ -141,13 +141,14 @@ class Motion(MotionState):
         self._teleported = False
 
     def snap_to_lane(self) -> None:
-        """Assign the actor to the lane at its pose; it follows the lane at its present angle.
+        """Assign the actor to the lane at its pose, on its route if lanes overlap; it follows it at its present angle.
 
         An actor outside the road that does not point along it keeps its heading.
         """
         self._crosses = self._rests = False
         x, y, z, h, _, _ = self._pose
-        location = self.roads.locate_pose(x, y, h, z, self._location) if self.roads is not None else None
+        before = self._location if self._route is None else self._route.location_at(self._route.project(x, y)[0])
+        location = self.roads.locate_pose(x, y, h, z, before) if self.roads is not None else None
         self._set_location(location)
         if self._location is not None and self.roads is not None and abs(math.cos(self._heading)) < ACROSS:
             self._crosses = not self.roads.on_road(self._location)
