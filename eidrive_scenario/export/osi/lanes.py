@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -107,10 +108,14 @@ class LaneMap:
             [other for other, link in links.get(key, {}).items() if link["kind"] == "successor"]
             for links in (graph.adj, graph.pred)
         )
-        for successor in after if ahead else before:
-            classification.lane_pairing.add().successor_lane_id.value = self._ids.of("lane", *successor)
-        for antecessor in before if ahead else after:
-            classification.lane_pairing.add().antecessor_lane_id.value = self._ids.of("lane", *antecessor)
+        start, end = (before, after) if ahead else (after, before)
+        # One pair for each way over the lane. One without neighbors has none
+        for antecessor, successor in product(start or (None,), end or (None,)) if start or end else ():
+            pairing = classification.lane_pairing.add()
+            if antecessor is not None:
+                pairing.antecessor_lane_id.value = self._ids.of("lane", *antecessor)
+            if successor is not None:
+                pairing.successor_lane_id.value = self._ids.of("lane", *successor)
         lane_message.source_reference.add(type="net.asam.opendrive", identifier=[road.id, str(section.s), str(lane.id)])
 
     def _add_boundary(self, message: Any, edge: LaneEdge, line: Line, number: int) -> None:

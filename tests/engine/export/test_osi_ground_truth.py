@@ -8,7 +8,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from opendrive_xml import elevation_xml, map_xml, road_xml, superelevation_xml
+from opendrive_xml import (
+    elevation_xml,
+    junction_xml,
+    lane_links_xml,
+    lane_xml,
+    map_xml,
+    predecessor_xml,
+    road_xml,
+    section_xml,
+    successor_xml,
+    superelevation_xml,
+)
 from openscenario_xml import object_xml, road_file_xml, scenario_xml, vehicle_xml
 from osi3trace.osi_trace import OSITrace
 from scipy.spatial.transform import Rotation
@@ -287,6 +298,41 @@ def test_lanes_have_boundaries_on_both_sides(tmp_path: Path) -> None:
                 ends = [vector(after.centerline[0]), vector(after.centerline[-1])]
                 assert min(np.linalg.norm(center[-1] - end) for end in ends) < 0.05
     assert checked > 10
+
+
+def test_lane_pairings_are_the_ways_over_a_lane(tmp_path: Path) -> None:
+    """OSI: "There can be multiple pairings with the same antecessor and different successor lanes and vice versa."
+
+    Road 1 leads to road 2, and this to the roads 3 and 4 of a junction. Their lanes 1 run against s, and have no links.
+    """
+    straight = section_xml(lane_xml(1), lane_xml(-1, link=lane_links_xml(-1, -1)))
+    connecting = section_xml("", lane_xml(-1, link=lane_links_xml(before=-1)))
+    road = tmp_path / "fork.xodr"
+    road.write_text(
+        map_xml(
+            road_xml("1", link=successor_xml("2"), lanes=straight),
+            road_xml("2", x=100.0, link=predecessor_xml("1") + successor_xml(junction="9"), lanes=straight),
+            *(road_xml(name, x=200.0, link=predecessor_xml("2"), lanes=connecting, junction="9") for name in "34"),
+            rest=junction_xml("9", "2", {"3": -1, "4": -1}),
+        )
+    )
+    (truth,) = exported(tmp_path, Frame(view({"A": {}})), road=road)
+    names = {lane.id.value: "/".join(lane.source_reference[0].identifier[::2]) for lane in truth.lane}
+    pairs = {
+        names[lane.id.value]: [
+            (names.get(pair.antecessor_lane_id.value), names.get(pair.successor_lane_id.value))
+            for pair in lane.classification.lane_pairing
+        ]
+        for lane in truth.lane
+    }
+    assert pairs == {
+        "1/1": [],
+        "1/-1": [(None, "2/-1")],
+        "2/1": [],
+        "2/-1": [("1/-1", "3/-1"), ("1/-1", "4/-1")],
+        "3/-1": [("2/-1", None)],
+        "4/-1": [("2/-1", None)],
+    }
 
 
 def test_actor_is_assigned_to_its_lane(tmp_path: Path) -> None:
