@@ -14,7 +14,7 @@ from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.run_files import ROAD_FILE
 from eidrive_scenario.rendering.daylight import daylight
 from eidrive_scenario.rendering.tone_mapping import LUMA
-from eidrive_scenario.world.environment import Environment, weather_from_environment
+from eidrive_scenario.world.environment import CLEAR, Environment, weather_from_environment
 from eidrive_scenario.world.weather import Weather
 
 _RAIN = (0.1, 0.5, 1.9, 8.1, 34.0, 149.0)
@@ -88,7 +88,8 @@ def _set_weather(kinds: Any, conditions: Any, weather: Weather, given: Environme
         conditions.ambient_illumination = kinds.AmbientIllumination.Value(f"AMBIENT_ILLUMINATION_LEVEL{level}")
         conditions.sun.azimuth = math.radians(-weather.sun_azimuth % 360.0)
         conditions.sun.elevation = math.radians(weather.sun_elevation)
-        conditions.sun.intensity = float(daylight(weather.model_copy(update={"cloud_cover": 0.0})).sun @ LUMA)
+        clear = weather.model_copy(update={"cloud_cover": 0.0, "precipitation": "none", "visual_range": CLEAR})
+        conditions.sun.intensity = float(daylight(clear).sun @ LUMA)
 
 
 _EGOS = frozenset({"ego", "hero", "ego_vehicle"})

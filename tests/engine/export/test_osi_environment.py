@@ -123,6 +123,20 @@ def test_sun_has_azimuth_counterclockwise_from_north() -> None:
     assert night.intensity == 0.0
 
 
+def test_intensity_of_the_sun_is_that_of_the_scenario() -> None:
+    """OSI and OpenSCENARIO both have the illuminance of the sun, which clouds, fog, and snow do not change."""
+    environment = Environment(
+        sun_azimuth=0.4,
+        sun_elevation=0.3,
+        illuminance=10_000.0,
+        precipitation="snow",
+        precipitation_intensity=10.0,
+        fog_range=100.0,
+        clouds="sevenOktas",
+    )
+    assert conditions(environment).sun.intensity == pytest.approx(10_000.0)
+
+
 def test_environment_without_sky_has_no_clouds_wind_and_sun() -> None:
     found = conditions(Environment(temperature=280.0, clouds="skyOff"))
     assert not any(found.HasField(name) for name in ("clouds", "wind", "sun"))
