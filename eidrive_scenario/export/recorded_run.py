@@ -17,9 +17,12 @@ from eidrive_scenario.recording.run_files import ROAD_FILE, recording_in
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.simulation.recorded_outcome import (
     AxleCenters,
+    Body,
     RecordedOutcome,
     recorded_axles,
+    recorded_bodies,
     recorded_outcome,
+    recorded_roles,
     recorded_trailers,
 )
 from eidrive_scenario.world.weather import Weather
@@ -52,6 +55,16 @@ class RecordedRun:
     def axles(self) -> Mapping[str, AxleCenters]:
         """Axles of the vehicles of the scenario, by name."""
         return recorded_axles(self.recording)
+
+    @cached_property
+    def roles(self) -> Mapping[str, str]:
+        """Roles of the vehicles of the scenario that have one, by name."""
+        return recorded_roles(self.recording)
+
+    @cached_property
+    def bodies(self) -> Mapping[str, Body]:
+        """Bodies of the actors of the scenario, by name."""
+        return recorded_bodies(self.recording)
 
     @cached_property
     def weather(self) -> Weather | None:

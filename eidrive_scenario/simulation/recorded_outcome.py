@@ -39,6 +39,8 @@ CONTEXT = "criteria_context"
 """Entry of the metadata with the names of the scenario to which criteria refer."""
 TRAILERS = "trailers"
 """Entry of the metadata with the vehicle categories of trailers and semitrailers, by name."""
+ROLES = "roles"
+"""Entry of the metadata with the roles of the vehicles that have one in the scenario, by name."""
 AXLES = "axles"
 """Entry of the metadata with the axles of the vehicles of the scenario, by name."""
 
@@ -169,7 +171,7 @@ def plain_verdict(verdict: Verdict) -> Verdict:
 def scenario_metadata(scenario: Scenario) -> dict[str, str]:
     """Return the entries of the metadata of a run about its scenario.
 
-    They are `CONTEXT`, `TRAILERS` if there are trailers, `AXLES` if there are vehicles, and `BODIES`.
+    They are `CONTEXT`, `TRAILERS` and `ROLES` if a vehicle has one, `AXLES` if there are vehicles, and `BODIES`.
     """
     metadata = {CONTEXT: canonical_json(codec(CriteriaContext).encode(criteria_context(scenario)))}
     vehicles = {name: entity for name, entity in scenario.entities.items() if isinstance(entity, Vehicle)}
@@ -179,6 +181,8 @@ def scenario_metadata(scenario: Scenario) -> dict[str, str]:
     }
     if trailers:
         metadata[TRAILERS] = canonical_json(trailers)
+    if roles := {name: role.value for name, car in vehicles.items() if (role := car.role or car.vehicle_role)}:
+        metadata[ROLES] = canonical_json(roles)
     if vehicles:
         centers = {name: _axle_centers(vehicle.axles) for name, vehicle in vehicles.items()}
         metadata[AXLES] = canonical_json(codec(Mapping[str, AxleCenters]).encode(centers))
@@ -218,6 +222,11 @@ def recorded_bodies(recording: Recording) -> Mapping[str, Body]:
 def recorded_trailers(recording: Recording) -> Mapping[str, str]:
     """Return the vehicle categories of trailers by name. Those of an older or damaged recording are unknown."""
     return _metadata(recording, TRAILERS, Mapping[str, str], {})
+
+
+def recorded_roles(recording: Recording) -> Mapping[str, str]:
+    """Return the roles of vehicles by name. Those of an older or damaged recording are unknown."""
+    return _metadata(recording, ROLES, Mapping[str, str], {})
 
 
 def recorded_context(recording: Recording) -> CriteriaContext:

@@ -192,22 +192,38 @@ def test_time_of_day_condition_follows_the_environment_clock(scene: RunScene) ->
     assert played.when("event 1", "runningState") == pytest.approx(0.7)
 
 
+LIGHT = private_xml(
+    '<AppearanceAction><LightStateAction transitionTime="{}"><LightType><VehicleLight vehicleLightType="{}"/>'
+    '</LightType><LightState mode="{}"/></LightStateAction></AppearanceAction>'
+)
+
+
 @pytest.mark.element("LightStateAction")
 def test_light_actions_on_different_lights_do_not_preempt(scene: RunScene) -> None:
-    light = private_xml(
-        '<AppearanceAction><LightStateAction transitionTime="{}"><LightType><VehicleLight vehicleLightType="{}"/>'
-        '</LightType><LightState mode="{}"/></LightStateAction></AppearanceAction>'
-    )
     played = scene(
         2,
-        ("Ego", light.format(1, "lowBeam", "on")),
-        ("Ego", light.format(1, "brakeLights", "on"), after(0.15)),
-        ("Ego", light.format(1, "lowBeam", "off"), after(0.35)),
+        ("Ego", LIGHT.format(1, "lowBeam", "on")),
+        ("Ego", LIGHT.format(1, "brakeLights", "on"), after(0.15)),
+        ("Ego", LIGHT.format(1, "lowBeam", "off"), after(0.35)),
     )
     assert played.commands[0].appearances["Ego"].lights == {"lowBeam": LightState("lowBeam", "on", fade=1.0)}
     assert set(played.commands[3].appearances["Ego"].lights) == {"lowBeam", "brakeLights"}
     assert played.when("action 0", "completeState") == pytest.approx(0.4)
     assert played.when("action 1", "completeState") == pytest.approx(1.2)
+
+
+@pytest.mark.element("LightStateAction")
+def test_fog_lights_are_those_at_the_front_and_rear(scene: RunScene) -> None:
+    """The light types `fogLightsFront` and `fogLightsRear` (1.2) are parts of `fogLights`."""
+    played = scene(
+        1,
+        ("Ego", LIGHT.format(0, "fogLightsRear", "off")),
+        ("Ego", LIGHT.format(0, "fogLights", "on"), after(0.15)),
+        ("Ego", LIGHT.format(0, "fogLightsFront", "off"), after(0.35)),
+    )
+    lights = [commands.appearances["Ego"].lights for commands in played.commands]
+    assert {name: light.mode for name, light in lights[3].items()} == {"fogLightsFront": "on", "fogLightsRear": "on"}
+    assert {name: light.mode for name, light in lights[5].items()} == {"fogLightsFront": "off", "fogLightsRear": "on"}
 
 
 @pytest.mark.element("CustomCommandAction")

@@ -25,6 +25,8 @@ COLORS: Mapping[str, tuple[float, float, float]] = {
 }
 """RGB values of the standard's ColorType, each in [0, 1]."""
 
+PARTS: Mapping[str, tuple[str, ...]] = {"fogLights": ("fogLightsFront", "fogLightsRear")}
+"""Lights of the standard that a light of the standard comprises."""
 MOTION = "motion"
 
 
@@ -88,7 +90,8 @@ class LightStateAction(ActionBehaviour):
             off_for=default.off_for if state.flashing_off_duration is None else state.flashing_off_duration,
         )
         before = context.appearance(name)
-        context.set_appearance(name, replace(before, lights={**before.lights, self._light: light}))
+        switched = {kind: replace(light, light=kind) for kind in PARTS.get(self._light, (self._light,))}
+        context.set_appearance(name, replace(before, lights={**before.lights, **switched}))
         self._until = light.since + light.fade
 
     def update(self) -> Status:

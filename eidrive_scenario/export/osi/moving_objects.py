@@ -41,6 +41,24 @@ _GENERIC: Mapping[str, str] = {
     "licensePlateIllumination": "license_plate_illumination_rear",
 }
 """Lights with the states on and off, by the type of OpenSCENARIO."""
+_ROLES: Mapping[str, str] = {
+    "none": "CIVIL",
+    "civil": "CIVIL",
+    "ambulance": "AMBULANCE",
+    "fire": "FIRE",
+    "fireBrigade": "FIRE",
+    "police": "POLICE",
+    "publicTransport": "PUBLIC_TRANSPORT",
+    "roadAssistance": "ROAD_ASSISTANCE",
+    "roadsideAssistance": "ROAD_ASSISTANCE",
+    "garbageCollection": "GARBAGE_COLLECTION",
+    "construction": "ROAD_CONSTRUCTION",
+    "military": "MILITARY",
+}
+"""Roles by those of OpenSCENARIO; OTHER for the rest."""
+_EMERGENCY = ("AMBULANCE", "FIRE", "POLICE")
+_SERVICE = ("ROAD_ASSISTANCE", "GARBAGE_COLLECTION", "ROAD_CONSTRUCTION")
+"""Roles with blue and with amber special purpose lights. The color of the light determines it for others."""
 _INDICATORS = (("warningLights", "WARNING"), ("indicatorLeft", "LEFT"), ("indicatorRight", "RIGHT"))
 
 
@@ -74,6 +92,10 @@ def add_moving_objects(
         set_vector(base.velocity, velocity[row])
         set_vector(base.acceleration, acceleration[row])
         base.orientation_rate.yaw = float(view.yaw_rate[row])
+        color = run.bodies[name].color if name in run.bodies else None
+        if color is not None:
+            rgb = moving_object.color_description.rgb
+            rgb.red, rgb.green, rgb.blue = color
         entity = _ENTITIES.get(category, "Vehicle")
         moving_object.source_reference.add(type="net.asam.openscenario", identifier=[entity, name])
         if row in lanes:
@@ -87,7 +109,10 @@ def add_moving_objects(
             if classification.has_trailer:
                 classification.trailer_id.value = ids.of(ACTOR, frame.trailers[name])
             _set_axles(moving_object.vehicle_attributes, view.offset[row], run.axles.get(name))
-            _set_lights(osi, classification.light_state, frame.appearances.get(name))
+            role = _ROLES.get(run.roles[name], "OTHER") if name in run.roles else ""
+            if role:
+                classification.role = osi.moving_object.VehicleClassification.Role.Value(f"ROLE_{role}")
+            _set_lights(osi, classification.light_state, frame.appearances.get(name), role)
         elif category == "pedestrian":
             set_vector(moving_object.pedestrian_attributes.bbcenter_to_root, -view.offset[row])
 
@@ -122,7 +147,7 @@ def center_motion(view: WorldView, arms: Array) -> tuple[Array, Array]:
     return view.velocity + rate * turned, view.acceleration - rate**2 * inward
 
 
-def _set_lights(osi: Osi, state: Any, appearance: Appearance | None) -> None:
+def _set_lights(osi: Osi, state: Any, appearance: Appearance | None, role: str) -> None:
     """Set the lights that the scenario switches; the others have no state."""
     if appearance is None or not appearance.lights:
         return
@@ -138,6 +163,10 @@ def _set_lights(osi: Osi, state: Any, appearance: Appearance | None) -> None:
     if "brakeLights" in modes:
         word = "NORMAL" if modes["brakeLights"] else "OFF"
         state.brake_light_state = kinds.BrakeLightState.Value(f"BRAKE_LIGHT_STATE_{word}")
-    if "specialPurposeLights" in modes:
-        word = "FLASHING_BLUE" if modes["specialPurposeLights"] else "OFF"
-        state.emergency_vehicle_illumination = kinds.GenericLightState.Value(f"GENERIC_LIGHT_STATE_{word}")
+    light = appearance.lights.get("specialPurposeLights")
+    if light is not None:
+        is_amber = light.color is not None and light.color[0] > light.color[2]
+        is_service = role in _SERVICE or (role not in _EMERGENCY and is_amber)
+        field = "service_vehicle_illumination" if is_service else "emergency_vehicle_illumination"
+        word = {"flashing": f"FLASHING_{'AMBER' if is_service else 'BLUE'}"}.get(light.mode, light.mode.upper())
+        setattr(state, field, kinds.GenericLightState.Value(f"GENERIC_LIGHT_STATE_{word}"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from opendrive_xml import (
 from openscenario_xml import object_xml, road_file_xml, scenario_xml, vehicle_xml
 from osi3trace.osi_trace import OSITrace
 from scipy.spatial.transform import Rotation
-from storyboard_xml import end_xml, init_xml, lane_position_xml, teleport_xml
+from storyboard_xml import end_xml, init_xml, lane_position_xml, teleport_xml, world_position_xml
 from written_recording import Body, detected, step, view, write_run
 
 from eidrive_scenario.experiments.single_run import run_and_save
@@ -37,6 +38,7 @@ from eidrive_scenario.world.appearance import Appearance, LightState
 
 ROADS = Path(__file__).parents[3] / "xosc" / "roads"
 MILLIMETER = 1e-3
+PAINT = '<Properties><Property name="eidrive.color" value="#ff8000"/></Properties>'
 
 
 def messages(path: Path) -> list[Any]:
@@ -229,6 +231,59 @@ def test_switched_lights_are_states(tmp_path: Path) -> None:
     assert type(state).GenericLightState.Name(state.head_light) == "GENERIC_LIGHT_STATE_OFF"
     assert not state.HasField("brake_light_state")
     assert not other.HasField("indicator_state")
+
+
+@pytest.mark.parametrize(
+    ("role", "color", "mode", "field", "state"),
+    [
+        ("police", None, "flashing", "emergency_vehicle_illumination", "FLASHING_BLUE"),
+        ("police", (1.0, 0.5, 0.0), "flashing", "emergency_vehicle_illumination", "FLASHING_BLUE"),
+        ("roadAssistance", None, "flashing", "service_vehicle_illumination", "FLASHING_AMBER"),
+        ("civil", (1.0, 0.5, 0.0), "flashing", "service_vehicle_illumination", "FLASHING_AMBER"),
+        ("civil", (0.0, 0.0, 1.0), "on", "emergency_vehicle_illumination", "ON"),
+        ("garbageCollection", None, "off", "service_vehicle_illumination", "OFF"),
+    ],
+)
+def test_special_purpose_lights_depend_on_role_and_color(
+    tmp_path: Path, role: str, color: tuple[float, float, float] | None, mode: str, field: str, state: str
+) -> None:
+    """GenericLightState: flashing blue is "to be used for emergency vehicles", amber "for service vehicles"."""
+    lights = {"specialPurposeLights": LightState("specialPurposeLights", mode, color=color)}
+    run = write_run(
+        tmp_path,
+        [Frame(view({"A": {}}), appearances={"A": Appearance(lights)})],
+        metadata={"roles": json.dumps({"A": role})},
+    )
+    write_osi(run, tmp_path / "trace.mcap")
+    (truth,) = messages(tmp_path / "trace.mcap")
+    lit = truth.moving_object[0].vehicle_classification.light_state
+    (only,) = lit.ListFields()
+    assert only[0].name == field
+    assert type(lit).GenericLightState.Name(only[1]) == f"GENERIC_LIGHT_STATE_{state}"
+
+
+def test_role_and_paint_are_those_of_the_scenario(tmp_path: Path) -> None:
+    """The paint #ff8000 is 255, 128 and 0 of 255. Neither is set where the scenario omits it."""
+    plain = vehicle_xml()
+    painted = plain.replace("<Vehicle ", '<Vehicle role="fire" ', 1)
+    painted = re.sub("<Properties */>|<Properties></Properties>", PAINT, painted)
+    assert PAINT in painted
+    result = run_and_save(
+        scenario_xml(
+            entities=object_xml("Ego", painted) + object_xml("Plain", plain),
+            init="".join(init_xml(name, teleport_xml(world_position_xml(0))) for name in ("Ego", "Plain")),
+            stop=end_xml(0.1),
+        ),
+        out=tmp_path / "run",
+    )
+    assert result.recording is not None
+    write_osi(open_run(result.recording), tmp_path / "trace.mcap")
+    (ego, other) = messages(tmp_path / "trace.mcap")[0].moving_object
+    assert ego.vehicle_classification.role == ego.VehicleClassification.ROLE_FIRE
+    rgb = ego.color_description.rgb
+    assert (rgb.red, rgb.green, rgb.blue) == pytest.approx((1.0, 128 / 255, 0.0))
+    assert not other.HasField("color_description")
+    assert not other.vehicle_classification.HasField("role")
 
 
 def test_traffic_lights_have_one_entity_per_lamp(scenario_3: tuple[Path, Path]) -> None:
