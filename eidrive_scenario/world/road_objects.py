@@ -30,7 +30,7 @@ SIZES: Mapping[str, tuple[float, float, float]] = {
 }
 """Default length, width and height by kind, for maps that omit them [m]."""
 
-_KINDS: Mapping[str, str] = {
+KINDS: Mapping[str, str] = {
     "tree": "tree",
     "vegetation": "vegetation",
     "pole": "pole",
@@ -48,7 +48,7 @@ _KINDS: Mapping[str, str] = {
     "trafficIsland": "island",
 }
 """Kinds by type of OpenDRIVE objects."""
-_WITHOUT_TYPE = ("none", "-1", "")
+WITHOUT_TYPE = ("none", "-1", "")
 STOREY = 3.2
 """Height of a storey [m]: the default height of a building, and the distance of its rows of windows."""
 LEAST = 0.1
@@ -127,7 +127,7 @@ def buildings(roads: RoadNetwork, without: Collection[str] = ()) -> Iterator[Bui
         road_object = placed.object
         if road_object.type != "building" or road_object.id in without:
             continue
-        height = _height(placed) or STOREY
+        height = object_height(placed) or STOREY
         for pose, length, width in footprint(roads, placed):
             center = (pose.x, pose.y, pose.z + height / 2)
             yield Building(
@@ -139,7 +139,7 @@ def road_object_bodies(roads: RoadNetwork, without: Collection[str] = ()) -> Ite
     """Yield the bodies of all objects and signal posts of a road network, except objects with some ids."""
     for placed in placed_objects(roads):
         if placed.object.id not in without:
-            yield from _object_bodies(roads, placed)
+            yield from object_bodies(roads, placed)
     for head in signal_heads(roads):
         if head.carried:
             foot = roads.road_pose_at(head.signal.place.road, head.signal.place.s, head.signal.place.t)
@@ -197,21 +197,22 @@ def _head(signal: Signal, pose: Pose, carried: bool) -> SignalHead:
     return SignalHead(signal, pose._replace(x=x, y=y, z=low), width, height, carried)
 
 
-def _object_bodies(roads: RoadNetwork, placed: PlacedObject) -> Iterator[RoadObjectBody]:
+def object_bodies(roads: RoadNetwork, placed: PlacedObject) -> Iterator[RoadObjectBody]:
+    """Yield the bodies of an object; none if it is painted on the road, or a building."""
     road_object = placed.object
-    kind = _KINDS.get(road_object.type)
-    if kind is None and road_object.type in _WITHOUT_TYPE and min(placed.length, placed.width, placed.height) >= STEP:
+    kind = KINDS.get(road_object.type)
+    if kind is None and road_object.type in WITHOUT_TYPE and min(placed.length, placed.width, placed.height) >= STEP:
         kind = "obstacle"
     if kind is None:
         return
     usual = SIZES[kind]
-    height = _height(placed) or usual[2]
+    height = object_height(placed) or usual[2]
     if height < LEAST:
         return
     name = road_object.name or f"{kind} {road_object.id}"
     for pose, given_length, given_width in footprint(roads, placed):
         length, width = given_length or usual[0], given_width or usual[1]
-        is_crown = road_object.type in _WITHOUT_TYPE and height > HEADROOM and _overhangs(roads, pose, length, width)
+        is_crown = road_object.type in WITHOUT_TYPE and height > HEADROOM and _overhangs(roads, pose, length, width)
         if kind == "tree" or is_crown:
             yield RoadObjectBody(name, "tree", pose, length, width, height, TRUNK * height)
         elif kind == "vegetation":
@@ -232,10 +233,11 @@ def _overhangs(roads: RoadNetwork, pose: Pose, length: float, width: float) -> b
     return over.size > 0 and not (over == CENTER).any()
 
 
-def _height(placed: PlacedObject) -> float:
-    """Return the height of an object, or the maximum height at its corners [m]; 0 if the map omits them."""
-    outlines_and_lines = (*placed.object.outlines, *placed.object.lines)
-    return max([placed.height, *(corner.height for corners in outlines_and_lines for corner in corners)])
+def object_height(placed: PlacedObject) -> float:
+    """Return the maximum height at the corners of an object, which outlines define, or else its height [m]; 0 if the
+    map omits them."""
+    outlines_and_lines = () if placed.shift is None else (*placed.object.outlines, *placed.object.lines)
+    return max((corner.height for corners in outlines_and_lines for corner in corners), default=0.0) or placed.height
 
 
 def footprint(roads: RoadNetwork, placed: PlacedObject) -> list[tuple[Pose, float, float]]:
@@ -275,10 +277,11 @@ def bounding_box(roads: RoadNetwork, placed: PlacedObject) -> tuple[Pose, float,
     """Return the box around the outlines of an object: pose of the center of its base, length and width [m]."""
     pose = placed.pose
     cos, sin = math.cos(pose.h), math.sin(pose.h)
-    offset = np.concatenate(outlines(roads, placed))[:, :2] - (pose.x, pose.y)
+    points = np.concatenate(outlines(roads, placed))
+    offset = points[:, :2] - (pose.x, pose.y)
     corners = np.stack([cos * offset[:, 0] + sin * offset[:, 1], cos * offset[:, 1] - sin * offset[:, 0]], axis=1)
     low, high = corners.min(axis=0), corners.max(axis=0)
     ahead, aside = ((low + high) / 2).tolist()
     length, width = (high - low).tolist()
-    middle = pose._replace(x=pose.x + cos * ahead - sin * aside, y=pose.y + sin * ahead + cos * aside)
-    return middle, length, width
+    x, y, z = pose.x + cos * ahead - sin * aside, pose.y + sin * ahead + cos * aside, float(points[:, 2].min())
+    return pose._replace(x=x, y=y, z=z), length, width

@@ -99,6 +99,27 @@ LOCAL = [f'<cornerLocal u="{u}" v="{v}" z="0" height="1.2"/>' for u, v in ((0, 0
 ON_ROAD = [f'<cornerRoad s="{50 + u}" t="{v - 10}" dz="0" height="1.2"/>' for u, v in ((0, 0), (6, 0), (6, 2), (0, 2))]
 
 
+def test_outline_replaces_height_and_base_of_the_object() -> None:
+    """OpenDRIVE: an outline supersedes the bounding box; z and dz of its corners are relative to object and road."""
+    size = 'type="obstacle" s="50" t="-8" zOffset="3" length="9" width="9" height="10"'
+    local = "".join(f'<cornerLocal u="{u}" v="{v}" z="-0.5" height="2"/>' for u, v in ((0, 0), (4, 0), (0, 2)))
+    body = only(f"{size}><outline>{local}</outline>")
+    assert (body.pose.z, body.height) == (2.5, 2.0)
+    road = "".join(f'<cornerRoad s="{s}" t="{t}" dz="0.5" height="2"/>' for s, t in ((50, -8), (54, -8), (50, -6)))
+    body = only(f"{size}><outline>{road}</outline>")
+    assert (body.pose.z, body.height) == (0.5, 2.0)
+
+
+@pytest.mark.parametrize("orientation", ["+", "-", "none"])
+def test_orientation_of_an_object_does_not_turn_it(orientation: str) -> None:
+    """OpenDRIVE: it is the direction in which the object is valid; `hdg` is the heading. Signals differ in this."""
+    corners = "".join(f'<cornerLocal u="{u}" v="{v}" z="0" height="2"/>' for u, v in ((0, 0), (4, 0), (0, 2)))
+    body = only(
+        f'type="obstacle" s="50" t="-8" zOffset="0" orientation="{orientation}"><outline>{corners}</outline>',
+    )
+    assert (body.pose.x, body.pose.y, body.pose.h) == (52.0, -7.0, 0.0)
+
+
 @pytest.mark.parametrize("corners", [LOCAL, ON_ROAD])
 def test_outline_is_moved_by_each_repetition(corners: list[str]) -> None:
     """The outline of 6 x 2 m begins at the object, which is repeated at s = 60, 70 and 80, t = -10, -11 and -12."""
