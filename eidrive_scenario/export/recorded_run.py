@@ -21,6 +21,7 @@ from eidrive_scenario.simulation.recorded_outcome import (
     RecordedOutcome,
     recorded_axles,
     recorded_bodies,
+    recorded_external_objects,
     recorded_outcome,
     recorded_roles,
     recorded_trailers,
@@ -65,6 +66,11 @@ class RecordedRun:
     def bodies(self) -> Mapping[str, Body]:
         """Bodies of the actors of the scenario, by name."""
         return recorded_bodies(self.recording)
+
+    @cached_property
+    def external_objects(self) -> frozenset[str]:
+        """Ids of the objects of the map that are entities of the scenario."""
+        return frozenset(recorded_external_objects(self.recording).values())
 
     @cached_property
     def weather(self) -> Weather | None:

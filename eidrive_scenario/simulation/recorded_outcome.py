@@ -43,6 +43,8 @@ ROLES = "roles"
 """Entry of the metadata with the roles of the vehicles that have one in the scenario, by name."""
 AXLES = "axles"
 """Entry of the metadata with the axles of the vehicles of the scenario, by name."""
+EXTERNAL_OBJECTS = "external_objects"
+"""Entry of the metadata with the ids of the road objects that are entities of the scenario, by the entity."""
 
 BODIES = "bodies"
 """Entry of the metadata with the bodies of the actors of the scenario, by name."""
@@ -171,7 +173,8 @@ def plain_verdict(verdict: Verdict) -> Verdict:
 def scenario_metadata(scenario: Scenario) -> dict[str, str]:
     """Return the entries of the metadata of a run about its scenario.
 
-    They are `CONTEXT`, `TRAILERS` and `ROLES` if a vehicle has one, `AXLES` if there are vehicles, and `BODIES`.
+    They are `CONTEXT`, `TRAILERS` and `ROLES` if a vehicle has one, `AXLES` if there are vehicles,
+    `EXTERNAL_OBJECTS` if there are any, and `BODIES`.
     """
     metadata = {CONTEXT: canonical_json(codec(CriteriaContext).encode(criteria_context(scenario)))}
     vehicles = {name: entity for name, entity in scenario.entities.items() if isinstance(entity, Vehicle)}
@@ -186,6 +189,8 @@ def scenario_metadata(scenario: Scenario) -> dict[str, str]:
     if vehicles:
         centers = {name: _axle_centers(vehicle.axles) for name, vehicle in vehicles.items()}
         metadata[AXLES] = canonical_json(codec(Mapping[str, AxleCenters]).encode(centers))
+    if scenario.external:
+        metadata[EXTERNAL_OBJECTS] = canonical_json({name: entity.name for name, entity in scenario.external.items()})
     return metadata | {BODIES: canonical_json(codec(Mapping[str, Body]).encode(bodies(scenario)))}
 
 
@@ -227,6 +232,11 @@ def recorded_trailers(recording: Recording) -> Mapping[str, str]:
 def recorded_roles(recording: Recording) -> Mapping[str, str]:
     """Return the roles of vehicles by name. Those of an older or damaged recording are unknown."""
     return _metadata(recording, ROLES, Mapping[str, str], {})
+
+
+def recorded_external_objects(recording: Recording) -> Mapping[str, str]:
+    """Return the ids of road objects that are entities, by the entity; unknown in an older or damaged recording."""
+    return _metadata(recording, EXTERNAL_OBJECTS, Mapping[str, str], {})
 
 
 def recorded_context(recording: Recording) -> CriteriaContext:

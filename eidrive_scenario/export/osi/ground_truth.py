@@ -6,9 +6,11 @@ import math
 from bisect import bisect_right
 from typing import Any
 
-from eidrive_scenario.export.osi.lanes import LaneMap, TrafficLights
+from eidrive_scenario.export.osi.lanes import LaneMap
 from eidrive_scenario.export.osi.moving_objects import ACTOR, VEHICLES, add_moving_objects
 from eidrive_scenario.export.osi.schemas import Identifiers, Osi
+from eidrive_scenario.export.osi.signals import Signals
+from eidrive_scenario.export.osi.stationary_objects import add_stationary_objects
 from eidrive_scenario.export.recorded_run import RecordedRun
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.run_files import ROAD_FILE
@@ -96,14 +98,14 @@ _EGOS = frozenset({"ego", "hero", "ego_vehicle"})
 
 
 class GroundTruthBuilder:
-    """Builder of the messages of one run. The first message contains the lanes and boundaries of the map."""
+    """Builder of the messages of one run. The first one contains lanes, boundaries, signs and objects of the map."""
 
     def __init__(self, osi: Osi, run: RecordedRun) -> None:
         self._osi = osi
         self._run = run
         self._ids = Identifiers()
         self._lanes = LaneMap(osi, run.roads, self._ids)
-        self._lights = TrafficLights(osi, run.roads, self._ids)
+        self._signals = Signals(osi, run.roads, self._ids)
         self._host = host_vehicle(run)
         self._has_map = False
 
@@ -120,10 +122,14 @@ class GroundTruthBuilder:
                 offset.position.x, offset.position.y, offset.position.z, offset.yaw = shift
         if not self._has_map:
             self._lanes.add(message)
+            self._signals.add_signs(message)
+            if self._run.roads is not None:
+                without = self._run.external_objects
+                add_stationary_objects(self._osi, message, self._run.roads, self._ids, without)
             self._has_map = True
         lanes = self._lanes.assigned(frame.view)
         add_moving_objects(self._osi, message, frame, self._ids, lanes, self._run)
-        self._lights.add(message, frame.signals)
+        self._signals.add_lights(message, frame.signals)
         if frame.environment is not None or self._run.weather is not None:
             conditions = message.environmental_conditions
             set_environment(self._osi, conditions, frame.environment, frame.view.time, self._run.weather)

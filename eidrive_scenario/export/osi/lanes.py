@@ -1,4 +1,4 @@
-"""Lanes, lane boundaries and traffic lights of a GroundTruth message, from the OpenDRIVE map of the run."""
+"""Lanes and lane boundaries of a GroundTruth message, from the OpenDRIVE map of the run."""
 
 from __future__ import annotations
 
@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 
 from eidrive_scenario.export.geometry import LaneEdge, Line, center_line, edge_line, lane_edges, point_spacing
-from eidrive_scenario.export.osi.schemas import Identifiers, Osi, set_orientation
+from eidrive_scenario.export.osi.schemas import Identifiers, Osi
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.location import LaneKey
 from eidrive_scenario.roads.model.road_map import DRIVABLE, Lane, LaneSection, Road
-from eidrive_scenario.roads.model.signal_states import FLASHING, ON, lamp_colors, lamps
-from eidrive_scenario.world.road_objects import signal_heads
 from eidrive_scenario.world.view import WorldView
 
 _SUBTYPES: Mapping[str, str] = {
@@ -136,37 +134,3 @@ class LaneMap:
 def _neighbor(number: int, step: int) -> int:
     """Return the next lane id to the left (+1) or right (-1) without lane 0."""
     return number + step or step
-
-
-_MODES = {ON: "MODE_CONSTANT", FLASHING: "MODE_FLASHING"}
-_DEPTH = 0.1
-"""Length of the box of a lamp along its direction [m]."""
-
-
-class TrafficLights:
-    """Lamps of all traffic lights of a map. Without a map there are none."""
-
-    def __init__(self, osi: Osi, roads: RoadNetwork | None, ids: Identifiers) -> None:
-        self._osi = osi
-        self._ids = ids
-        heads = [] if roads is None else signal_heads(roads)
-        self._heads = [(head, colors) for head in heads if (colors := lamp_colors(head.signal))]
-
-    def add(self, message: Any, states: Mapping[str, str]) -> None:
-        """Add the lamps with their states, by the id of the signal. A light without a state is dark, as in images."""
-        kinds = self._osi.traffic_light.Classification
-        for head, colors in self._heads:
-            shown = lamps(states.get(head.signal.id, ""), colors)
-            height = head.height / len(shown)
-            for index, (color, mode) in enumerate(shown):
-                lamp = message.traffic_light.add()
-                lamp.id.value = self._ids.of("lamp", head.signal.id, index)
-                base = lamp.base
-                base.position.x, base.position.y = head.pose.x, head.pose.y
-                base.position.z = head.pose.z + (len(shown) - index - 0.5) * height
-                base.dimension.length, base.dimension.width, base.dimension.height = _DEPTH, head.width, height
-                set_orientation(base.orientation, head.pose.h)
-                lamp.classification.color = kinds.Color.Value(f"COLOR_{color.upper()}")
-                lamp.classification.icon = kinds.Icon.Value("ICON_NONE")
-                lamp.classification.mode = kinds.Mode.Value(_MODES.get(mode, "MODE_OFF"))
-                lamp.source_reference.add(type="net.asam.opendrive", identifier=[head.signal.id])

@@ -28,8 +28,13 @@ class Osi:
         ground_truth = optional_import("osi3.osi_groundtruth_pb2", "export")
         self.ground_truth: Any = ground_truth.GroundTruth
         self.sensor_data: Any = optional_import("osi3.osi_sensordata_pb2", "export").SensorData
-        self.moving_object: Any = optional_import("osi3.osi_object_pb2", "export").MovingObject
+        objects = optional_import("osi3.osi_object_pb2", "export")
+        self.stationary_object: Any = objects.StationaryObject
+        self.moving_object: Any = objects.MovingObject
         self.traffic_light: Any = optional_import("osi3.osi_trafficlight_pb2", "export").TrafficLight
+        sign = optional_import("osi3.osi_trafficsign_pb2", "export")
+        self.traffic_sign: Any = sign.TrafficSign
+        self.sign_value: Any = sign.TrafficSignValue
         self.lane: Any = optional_import("osi3.osi_lane_pb2", "export").Lane
         self.lane_boundary: Any = optional_import("osi3.osi_lane_pb2", "export").LaneBoundary
         self.environment: Any = optional_import("osi3.osi_environment_pb2", "export").EnvironmentalConditions

@@ -29,7 +29,7 @@ _CHANNEL = f"{TRACE_METADATA}.channel"
 _LISTS: Mapping[str, str] = {"detections": "own detections", "fused": "objects after fusion"}
 """Object lists of a station, with their descriptions."""
 _CONVENTIONS = (
-    "lanes and boundaries are in the first GroundTruth only; "
+    "lanes, boundaries, signs and stationary objects are in the first GroundTruth only; "
     "bbcenter_to_rear of vehicles of background traffic points to the ground below the rear axle"
 )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from lxml import etree
@@ -20,6 +21,8 @@ from eidrive_scenario.roads.model.road_map import (
 )
 from eidrive_scenario.roads.reading.attribute_reader import AttributeReader
 
+_CATALOG_NUMBER = re.compile(r"^(1)\.(0\d\d)\.(\d{3})$")
+"""Type of the OpenDRIVE signal catalog as its documents print it, for example 1.000.001 for 1000001."""
 MAX_REPETITIONS = 100_000
 """Maximum number of repetitions of an object."""
 MAX_OBJECTS = 200_000
@@ -83,7 +86,7 @@ def _read_signal(road: Road, element: etree._Element, collector: AttributeReader
     return Signal(
         id=collector.text(element, "id"),
         name=element.get("name", ""),
-        type=collector.text(element, "type"),
+        type=_CATALOG_NUMBER.sub(r"\1\2\3", collector.text(element, "type")),
         subtype=element.get("subtype", ""),
         country=element.get("country", ""),
         value=collector.number(element, "value", None),
