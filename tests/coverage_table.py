@@ -183,7 +183,6 @@ WITHOUT_EFFECT = {
     "SensorAttachment.sensorRef": "sensors are those of the station's controller",
     "SensorAttachments.SensorAttachment": "sensors are those of the station's controller",
     "Vehicle.SensorAttachments": "sensors are those of the station's controller",
-    "Vehicle.vehicleRole": "only descriptive; traffic draws roles from its own distribution",
 }
 """Attributes and children of the standard that are read and checked, but not used by the engine."""
 
