@@ -13,7 +13,8 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import equidistant
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.polynomials import Polynomials
-from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road
+from eidrive_scenario.roads.model.road_map import Lane, LaneSection, Road, RoadMark
+from eidrive_scenario.roads.surfaces import mark_dashes
 
 
 def angles(turn: Array) -> tuple[float, float, float]:
@@ -56,6 +57,7 @@ class LaneEdge:
     end: float
     type: str
     color: str
+    mark: RoadMark | None = None
 
 
 def point_spacing(roads: RoadNetwork) -> float:
@@ -77,7 +79,7 @@ def lane_edges(section: LaneSection, lane: Lane | None) -> Iterator[LaneEdge]:
     for mark, start, end in zip(marks, starts, [*starts, section.end][1:], strict=True):
         if end > start:
             color = mark.color if mark.color in _COLORS else "white"
-            yield LaneEdge(start, end, _MARKS.get(mark.type, "SOLID_LINE"), color)
+            yield LaneEdge(start, end, _MARKS.get(mark.type, "SOLID_LINE"), color, mark)
 
 
 def center_line(roads: RoadNetwork, road: Road, section: LaneSection, lane: Lane, spacing: float) -> Line:
@@ -91,6 +93,25 @@ def edge_line(roads: RoadNetwork, road: Road, section: LaneSection, lane: Lane, 
     return _line(roads, road, section, lane, lane.outer, (edge.start, edge.end), spacing)[1]
 
 
+def dashed_edge_line(
+    roads: RoadNetwork, road: Road, section: LaneSection, lane: Lane, edge: LaneEdge, spacing: float
+) -> tuple[Line, list[str]]:
+    """Return an edge with additional points at the starts and ends of the dashes of a broken mark.
+
+    The names are those of OSI for the points of the dashes and gaps, without names for other marks.
+    """
+    if edge.mark is None or edge.type != "DASHED_LINE":
+        return edge_line(roads, road, section, lane, edge, spacing), []
+    dashes = mark_dashes(lane, edge.mark, edge.start, edge.end)
+    ends = (edge.start, edge.end)
+    stations, line = _line(roads, road, section, lane, lane.outer, ends, spacing, dashes.ravel())
+    names = np.full(len(stations), "GAP", dtype="<U8")
+    for low, high in np.searchsorted(stations, dashes).tolist():
+        names[low:high] = "CONTINUE"
+        names[low], names[high] = "START", "END"
+    return line, names.tolist()
+
+
 def _line(
     roads: RoadNetwork,
     road: Road,
@@ -99,8 +120,9 @@ def _line(
     distance: Polynomials,
     ends: tuple[float, float],
     spacing: float,
+    among: Array | None = None,
 ) -> tuple[list[float], Line]:
-    """Return s and points of a line at a distance from the lane offset.
+    """Return s and points of a line at a distance from the lane offset, with points at the s `among` them (K,).
 
     Intervals of `spacing` are halved where the line is farther than `DEVIATION` from the chord.
     """
@@ -111,6 +133,8 @@ def _line(
         return np.column_stack([poses.x, poses.y, poses.z])
 
     stations = np.array(equidistant(*ends, spacing))
+    if among is not None:
+        stations = np.unique(np.concatenate([stations, among]))
     line, fresh = points(stations), np.diff(stations) > 0.0
     for _ in range(HALVINGS):
         if not fresh.any():

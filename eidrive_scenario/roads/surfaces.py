@@ -267,21 +267,38 @@ def _mark_strips(
 ) -> Iterator[tuple[Array, Array, float]]:
     """Yield paint along a road: s and t (K, P) of K pieces with P points each, and width [m]."""
     for offset, width, dash, gap, phase in _lines(lane, mark):
-        period, low, high = dash + gap, start, end
-        if math.isinf(gap):
-            low, high = start + phase, min(start + phase + dash, end)
-        if dash > 0.0 and 0.0 < gap < math.inf and period > FINEST and end - start < MOST_DASHES * period:
-            starts = np.arange(start + (phase if phase >= 0.0 else phase % period), end, period)
-            if not starts.size:
-                continue
+        dashes = _dashes(start, end, dash, gap, phase)
+        if not dashes.size:
+            continue
+        if _is_broken(end - start, dash, gap):
             bent = any(abs(road.reference.at(float(s)).curvature) > CURVED for s in (start, 0.5 * (start + end), end))
             share = np.linspace(0.0, 1.0, 4 if bent else 2)
-            s = starts[:, None] + (np.minimum(starts + dash, end) - starts)[:, None] * share
-        elif low < high:
-            s = np.array([low, *(cut for cut in cuts if low < cut < high), high])[None, :]
+            s = dashes[:, :1] + np.diff(dashes) * share
         else:
-            continue
+            ((low, high),) = dashes.tolist()
+            s = np.array([low, *(cut for cut in cuts if low < cut < high), high])[None, :]
         yield s, _edge(road, section, lane, s) + offset, width
+
+
+def mark_dashes(lane: Lane, mark: RoadMark, start: float, end: float) -> Array:
+    """Return s of the starts and ends of the dashes (K, 2) of the first line of a mark [m]. A solid line has one."""
+    lines = _lines(lane, mark)
+    return _dashes(start, end, *lines[0][2:]) if lines else np.empty((0, 2))
+
+
+def _dashes(start: float, end: float, dash: float, gap: float, phase: float) -> Array:
+    period = dash + gap
+    if _is_broken(end - start, dash, gap):
+        starts = np.arange(start + (phase if phase >= 0.0 else phase % period), end, period)
+        return np.column_stack([starts, np.minimum(starts + dash, end)])
+    low, high = (start + phase, min(start + phase + dash, end)) if math.isinf(gap) else (start, end)
+    return np.array([[low, high]] if low < high else []).reshape(-1, 2)
+
+
+def _is_broken(length: float, dash: float, gap: float) -> bool:
+    """Return whether a line of this length has dashes that are neither too short nor too many."""
+    period = dash + gap
+    return dash > 0.0 and 0.0 < gap < math.inf and period > FINEST and length < MOST_DASHES * period
 
 
 def _lines(lane: Lane, mark: RoadMark) -> list[tuple[float, float, float, float, float]]:

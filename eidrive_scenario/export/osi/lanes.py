@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from eidrive_scenario.export.geometry import LaneEdge, Line, center_line, edge_line, lane_edges, point_spacing
+from eidrive_scenario.export.geometry import LaneEdge, Line, center_line, dashed_edge_line, lane_edges, point_spacing
 from eidrive_scenario.export.osi.schemas import Identifiers, Osi
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.location import LaneKey
@@ -52,9 +52,9 @@ class LaneMap:
                     continue
                 for lane in section.lanes.values():
                     for index, edge in enumerate(lane_edges(section, lane)):
-                        line = edge_line(self._roads, road, section, lane, edge, spacing)
+                        line, dashes = dashed_edge_line(self._roads, road, section, lane, edge, spacing)
                         number = self._ids.of("boundary", road.id, section.index, lane.id, index)
-                        self._add_boundary(message, edge, line, number)
+                        self._add_boundary(message, edge, line, dashes, number)
                     if lane.id:
                         line = center_line(self._roads, road, section, lane, spacing)
                         self._add_lane(message, road, section, lane, line)
@@ -116,13 +116,18 @@ class LaneMap:
                 pairing.successor_lane_id.value = self._ids.of("lane", *successor)
         lane_message.source_reference.add(type="net.asam.opendrive", identifier=[road.id, str(section.s), str(lane.id)])
 
-    def _add_boundary(self, message: Any, edge: LaneEdge, line: Line, number: int) -> None:
+    def _add_boundary(self, message: Any, edge: LaneEdge, line: Line, dashes: list[str], number: int) -> None:
         kinds = self._osi.lane_boundary.Classification
         boundary = message.lane_boundary.add()
         boundary.id.value = number
         for x, y, z in line:
             position = boundary.boundary_line.add().position
             position.x, position.y, position.z = x, y, z
+        for point, name in zip(boundary.boundary_line, dashes, strict=False):
+            point.dash = self._osi.lane_boundary.BoundaryPoint.Dash.Value(f"DASH_{name}")
+        if edge.mark is not None and edge.type in ("SOLID_LINE", "DASHED_LINE") and edge.mark.width > 0.0:
+            # Further points have the width of the first one
+            boundary.boundary_line[0].width = edge.mark.width
         boundary.classification.type = kinds.Type.Value(f"TYPE_{edge.type}")
         color = "NONE" if edge.type == "NO_LINE" else edge.color.upper()
         boundary.classification.color = kinds.Color.Value(f"COLOR_{color}")

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
-from opendrive_xml import map_xml, road_xml
+from opendrive_xml import lanes_xml, map_xml, road_xml
 from openscenario_xml import object_xml, road_file_xml, scenario_xml
 from storyboard_xml import end_xml, init_xml, lane_position_xml, teleport_xml
 from written_recording import view, write_run
@@ -46,6 +46,47 @@ def valid(first: int, last: int) -> str:
 def lanes(truth: Any, assigned: Any) -> list[str]:
     names = {lane.id.value: lane.source_reference[0].identifier[2] for lane in truth.lane}
     return [names[number.value] for number in assigned]
+
+
+@pytest.mark.parametrize(
+    ("pattern", "expected"),
+    [
+        ((4.0, 5.0, 0.0), {0: "START", 4: "END", 9: "START", 13: "END", 18: "START", 20: "END"}),
+        ((4.0, 5.0, 3.0), {0: "GAP", 3: "START", 7: "END", 12: "START", 16: "END", 20: "GAP"}),
+        (None, {0: "START", 3: "END", 9: "START", 12: "END", 18: "START", 20: "END"}),
+    ],
+)
+def test_dashes_of_broken_lines_are_points(
+    pattern: tuple[float, float, float] | None, expected: dict[int, str]
+) -> None:
+    """LaneBoundary: for dashed lines, one point "has to be at the start and another at the end" of each dash.
+
+    Dashes of 4 m with spaces of 5 m begin at sOffset on the road of 20 m; by default they have 3 and 6 m.
+    """
+    dash = '<type name="broken"><line length="{}" space="{}" sOffset="{}" tOffset="0" width="0.12"/></type>'
+    lines = "" if pattern is None else dash.format(*pattern)
+    mark = f'<roadMark sOffset="0" type="broken" color="white" width="0.12">{lines}</roadMark>'
+    truth, _ = truths(map_xml(road_xml(length=20.0, lanes=lanes_xml(0, 1, more=mark))))
+    (edge,) = (one for one in truth.lane_boundary if one.classification.type == one.Classification.TYPE_DASHED_LINE)
+    assert edge.boundary_line[0].width == 0.12
+    x = [point.position.x for point in edge.boundary_line]
+    names = [point.Dash.Name(point.dash).removeprefix("DASH_") for point in edge.boundary_line]
+    shown = {round(at): name for at, name in zip(x, names, strict=True) if name in ("START", "END") or at in (0, 20)}
+    assert x == sorted(x)
+    assert shown == expected
+    for at, name in zip(x, names, strict=True):
+        before = max(place for place in expected if place <= at + 1e-9)
+        if abs(at - before) > 1e-9:
+            assert name == ("CONTINUE" if expected[before] == "START" else "GAP")
+
+
+@pytest.mark.parametrize("kind", ["solid", "none", "curb"])
+def test_boundaries_that_are_not_broken_have_no_dashes(kind: str) -> None:
+    mark = f'<roadMark sOffset="0" type="{kind}" color="white" width="0.12"/>'
+    truth, _ = truths(map_xml(road_xml(length=20.0, lanes=lanes_xml(0, 1, more=mark))))
+    points = [point for edge in truth.lane_boundary for point in edge.boundary_line]
+    assert not any(point.HasField("dash") for point in points)
+    assert any(point.HasField("width") for point in points) == (kind == "solid")
 
 
 @pytest.mark.parametrize(
