@@ -62,14 +62,26 @@ class Body:
 
 
 @dataclass(frozen=True)
+class AxleWheels:
+    """Wheels of an axle: x and z from the reference point, track width, and diameter [m]."""
+
+    x: float
+    z: float
+    track: float
+    diameter: float
+
+
+@dataclass(frozen=True)
 class AxleCenters:
     """Centers of the axles of a vehicle: x and z from the reference point [m].
 
-    front  None without a front axle, as of trailers
+    front   None without a front axle, as of trailers
+    wheels  of all axles from the front to the rear; empty in recordings that lack them
     """
 
     rear: tuple[float, float]
     front: tuple[float, float] | None
+    wheels: tuple[AxleWheels, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -209,8 +221,12 @@ def bodies(scenario: Scenario) -> dict[str, Body]:
 
 def _axle_centers(axles: Axles) -> AxleCenters:
     rear, front = axles.rear_axle, axles.front_axle
+    every = (rear, *axles.additional_axle) if front is None else (front, rear, *axles.additional_axle)
+    wheels = (AxleWheels(axle.position_x, axle.position_z, axle.track_width, axle.wheel_diameter) for axle in every)
     return AxleCenters(
-        (rear.position_x, rear.position_z), None if front is None else (front.position_x, front.position_z)
+        (rear.position_x, rear.position_z),
+        None if front is None else (front.position_x, front.position_z),
+        tuple(sorted(wheels, key=lambda axle: -axle.x)),
     )
 
 

@@ -126,6 +126,13 @@ def _set_axles(attributes: Any, offset: Array, axles: AxleCenters | None) -> Non
     if axles is not None and axles.front is not None:
         x, z = axles.front
         set_vector(attributes.bbcenter_to_front, np.array([x, 0.0, z]) - offset)
+    for number, axle in enumerate(() if axles is None else axles.wheels):
+        # OSI counts the wheels from the right to the left. Without a track width there is one, as of a bicycle
+        for index, side in enumerate((-0.5, 0.5) if axle.track > 0.0 else (0.0,)):
+            wheel = attributes.wheel_data.add(axle=number, index=index, wheel_radius=0.5 * axle.diameter)
+            set_vector(wheel.position, np.array([axle.x, side * axle.track, axle.z]) - offset)
+    if attributes.wheel_data:
+        attributes.number_wheels = len(attributes.wheel_data)
 
 
 def rear_axle(axles: AxleCenters | None) -> Array:

@@ -117,6 +117,32 @@ def test_axles_are_measured_from_the_box_center_on_any_slope(tmp_path: Path) -> 
     assert not person.HasField("vehicle_attributes")
 
 
+def test_wheels_are_counted_from_front_right_and_measured_from_the_box_center(tmp_path: Path) -> None:
+    """OSI: axle 0 is the front-most one, and "the rear-right wheel would be (axle=1, index=0)" on a car.
+
+    The center is at (1.4, 0, 0.75). The wheels of 0.6 m are at x of 2.8 and 0 m, y of 0.8 m to both sides, z of 0.3 m.
+    The bicycle has no track width, so that it has one wheel on each axle.
+    """
+    car = vehicle_xml()
+    bicycle = re.sub('trackWidth="[^"]*"', 'trackWidth="0"', car)
+    init = "".join(init_xml(name, teleport_xml(world_position_xml(0))) for name in ("Car", "Bicycle"))
+    entities = object_xml("Car", car) + object_xml("Bicycle", bicycle)
+    result = run_and_save(scenario_xml(entities=entities, init=init, stop=end_xml(0.1)), out=tmp_path / "run")
+    assert result.recording is not None
+    write_osi(open_run(result.recording), tmp_path / "trace.mcap")
+    four, two = (one.vehicle_attributes for one in messages(tmp_path / "trace.mcap")[0].moving_object)
+    assert (four.number_wheels, two.number_wheels) == (4, 2)
+    wheels = {(wheel.axle, wheel.index): vector(wheel.position) for wheel in four.wheel_data}
+    assert wheels == {
+        (0, 0): pytest.approx([1.4, -0.8, -0.45]),
+        (0, 1): pytest.approx([1.4, 0.8, -0.45]),
+        (1, 0): pytest.approx([-1.4, -0.8, -0.45]),
+        (1, 1): pytest.approx([-1.4, 0.8, -0.45]),
+    }
+    assert {wheel.wheel_radius for wheel in four.wheel_data} == {0.3}
+    assert [(wheel.axle, wheel.index, wheel.position.y) for wheel in two.wheel_data] == [(0, 0, 0.0), (1, 0, 0.0)]
+
+
 def test_rear_axle_of_vehicle_with_unknown_axles_is_the_reference_point(tmp_path: Path) -> None:
     """As of background traffic, and of recordings that lack the axles."""
     (truth,) = exported(tmp_path, Frame(view({"A": {}})))
