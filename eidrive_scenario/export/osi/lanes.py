@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from itertools import product
 from typing import Any
 
-import numpy as np
-
+from eidrive_scenario.evaluation.actor_tracking import LaneTracker
 from eidrive_scenario.export.geometry import LaneEdge, Line, center_line, dashed_edge_line, lane_edges, point_spacing
 from eidrive_scenario.export.osi.schemas import Identifiers, Osi
 from eidrive_scenario.roads import RoadNetwork
@@ -40,6 +39,7 @@ class LaneMap:
         self._osi = osi
         self._roads = roads
         self._ids = ids
+        self._actors: dict[str, LaneTracker] = {}
 
     def add(self, message: Any) -> None:
         """Add all lanes and boundaries."""
@@ -61,13 +61,11 @@ class LaneMap:
 
     def assigned(self, view: WorldView) -> dict[int, int]:
         """Return the identifiers of the lanes on which actors are, by row."""
-        if self._roads is None or not view.names or not self._roads.roads:
-            return {}
-        centers = view.centers
-        locations = self._roads.locate(centers[:, 0], centers[:, 1], view.position[:, 2])
-        assigned = {}
-        for row in np.flatnonzero(locations.found & (locations.outside <= 0.0)).tolist():
-            location = locations.location(row)
+        assigned: dict[int, int] = {}
+        if self._roads is None:
+            return assigned
+        for name, row in view.rows.items():
+            location = self._actors.setdefault(name, LaneTracker(self._roads)).under_center(view, row)
             if location is not None and location.lane:
                 section = self._roads.roads[location.road].section_at(location.s)
                 assigned[row] = self._ids.of("lane", location.road, section.index, location.lane)
