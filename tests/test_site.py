@@ -30,7 +30,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.exhaustive
+@pytest.mark.process
 def test_site_has_every_page_and_picture(site: Path) -> None:
     for page in (ROOT / "docs").glob("*.md"):
         assert (site / f"{page.stem}.html").is_file()
@@ -40,6 +40,7 @@ def test_site_has_every_page_and_picture(site: Path) -> None:
         assert (site / "_images" / picture.name).is_file()
 
 
+@pytest.mark.process
 def test_reference_describes_each_public_name_once(site: Path) -> None:
     modules = [path.stem for path in (ROOT / "eidrive_scenario" / "api").glob("*.py") if path.stem != "__init__"]
     described: Counter[str] = Counter()

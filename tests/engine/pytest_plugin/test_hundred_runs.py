@@ -17,7 +17,7 @@ from lxml import etree
 xunit2 = pytest.importorskip("junitparser.xunit2")
 
 pytest_plugins = ["pytester"]
-pytestmark = pytest.mark.timeout(900)
+pytestmark = [pytest.mark.process, pytest.mark.timeout(900)]
 """Two workers load the engine several times, and one run lasts for the wall limit."""
 
 LIMIT = 25
@@ -58,7 +58,6 @@ def junit(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root / "junit.xml"
 
 
-@pytest.mark.exhaustive
 def test_broken_runs_are_reported_as_what_they_are(junit: Path) -> None:
     cases = {str(case.get("name")): case for case in ElementTree.parse(junit).iter("testcase")}
     assert len(cases) == 100

@@ -242,6 +242,7 @@ def test_tracker_begins_with_measured_velocity(tmp_path: Path) -> None:
     np.testing.assert_allclose(tracks.velocity, [[8.0, 0.0]] * 4, atol=0.5)
 
 
+@pytest.mark.statistical
 def test_stated_deviation_of_velocities_is_that_of_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of each axis, within a factor of two: 250 detections of moving, and 290 of standing vehicles."""
     detect, detected = PillarDetector.detect, list[Detections]()
