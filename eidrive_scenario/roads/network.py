@@ -403,8 +403,9 @@ class RoadNetwork:
         def deviation(location: LaneLocation) -> float:
             return abs(location.offset) + FRONT * angle(location)
 
-        is_certain = self.is_level or (z is not None and self.is_on_level(nearest, z))
-        if is_certain and self.road(nearest.road).junction_id is None:
+        is_on_level = self.is_level or (z is not None and self.is_on_level(nearest, z))
+        is_alone = self.road(nearest.road).junction_id is None
+        if is_on_level and (is_alone or (hint is not None and deviation(nearest) <= LEAST_GAIN)):
             return nearest
         below = self.locations_at(x, y)
         if z is not None:
