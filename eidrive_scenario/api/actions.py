@@ -34,6 +34,7 @@ from eidrive_scenario.storyboard.kinematics.motion import LateralStep as Lateral
 from eidrive_scenario.storyboard.kinematics.motion import Motion as Motion
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition as ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.route import build_route as build_route
+from eidrive_scenario.storyboard.kinematics.route import by_coordinates as by_coordinates
 from eidrive_scenario.storyboard.kinematics.route import faces_traffic as faces_traffic
 from eidrive_scenario.storyboard.kinematics.route import random_route as random_route
 from eidrive_scenario.storyboard.kinematics.route import uniform_branch_selector as uniform_branch_selector

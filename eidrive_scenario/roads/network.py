@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, cached_property, lru_cache
 from itertools import pairwise
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -502,6 +503,48 @@ class RoadNetwork:
             ordered = lanes[::-1] if against_traffic else lanes
             parts.append(Route(self.tables, ordered, a, b, against_traffic=against_traffic))
         return parts[0] if len(parts) == 1 else concatenate_routes(parts)
+
+    def lanes_near(self, location: LaneLocation) -> list[LaneLocation]:
+        """Return a location, and those on other lanes of its junction whose centers are as near to the place.
+
+        Lanes for vehicles on its level count whose center is at most 0.5 m farther than the nearest one.
+        """
+        if self.road(location.road).junction_id is None:
+            return [location]
+        x, y, z, *_ = self.pose(location)
+        lanes = [lane for lane in self.locations_at(x, y) if self._lane(lane).drivable and self.is_on_level(lane, z)]
+        limit = LEAST_GAIN + min((abs(lane.offset) for lane in lanes), default=0.0)
+        return [location, *(lane for lane in lanes if lane[:2] != location[:2] and abs(lane.offset) <= limit)]
+
+    def select_lanes(
+        self,
+        places: Sequence[Sequence[LaneLocation]],
+        costs: Sequence[Cost | None] | None = None,
+        *,
+        against_traffic: bool = False,
+    ) -> list[LaneLocation]:
+        """Return a lane location at each place, such that the route through them is the shortest.
+
+        places  locations from which to select; of equally short routes, that of the first ones is selected
+        costs   cost functions of the legs, as of `route`
+        """
+        if all(len(lanes) == 1 for lanes in places):
+            return [lanes[0] for lanes in places]
+
+        def length(a: LaneLocation, b: LaneLocation, cost: Cost | None) -> float:
+            try:
+                return self.route(a, b, costs=[cost], against_traffic=against_traffic).reference_length
+            except RouteError:
+                return math.inf
+
+        # The shortest ways to each lane of a place extend those to the lanes of the place before.
+        ways = [(0.0, [lane]) for lane in places[0]]
+        for lanes, cost in zip(places[1:], costs or [None] * len(places), strict=False):
+            ways = [
+                min(((done + length(way[-1], lane, cost), [*way, lane]) for done, way in ways), key=itemgetter(0))
+                for lane in lanes
+            ]
+        return min(ways, key=itemgetter(0))[1]
 
     def _find_lanes(self, start: LaneLocation, end: LaneLocation, cost: Cost | None) -> tuple[LaneKey, ...]:
         """Return the lanes of the cheapest route. Raise RouteError; if the file lacks a link for it, with its rule."""

@@ -22,6 +22,7 @@ from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.kinematics.motion import Motion
+from eidrive_scenario.storyboard.kinematics.route import build_route
 from eidrive_scenario.storyboard.positions.resolution import resolve_position
 
 
@@ -157,3 +158,45 @@ def test_vehicle_that_starts_where_a_bridge_crosses_keeps_its_height(
     assert [pose[2] for pose in poses] == pytest.approx([z] * len(poses), abs=0.05)
     aside = [pose[1] - y if road == "1" else pose[0] - x for pose in poses]
     assert aside == pytest.approx([0.0] * len(poses), abs=0.2)
+
+
+@pytest.mark.parametrize("spacing", [3.0, 7.0])
+def test_waypoints_in_a_junction_are_on_the_lanes_of_the_shortest_route(junction: RoadNetwork, spacing: float) -> None:
+    """Positions along a way over the junction, without headings and up to 0.3 m beside it, give the same way."""
+    generator = np.random.default_rng(5)
+    context = RuntimeContext(load_scenario(scenario_xml()), junction, dt=0.1, seed=0)
+    for road in connecting_roads(junction):
+        middle = junction.location(road.id, -1, 0.5 * road.length)
+        before, after = junction.advance(middle, -30.0), junction.advance(middle, 30.0)
+        assert before is not None
+        assert after is not None
+        way = junction.route(before, after, via=[middle])
+        points = way.polyline(spacing)[:, :2] + generator.uniform(-0.2, 0.2, (len(way.polyline(spacing)), 2))
+        waypoints = tuple(
+            model.Waypoint(
+                position=model.Position(world_position=model.WorldPosition(x=x, y=y)),
+                route_strategy=model.RouteStrategy.SHORTEST,
+            )
+            for x, y in points.tolist()
+        )
+        route = model.Route(name="way", closed=False, waypoint=waypoints)
+        built = build_route(route, junction, lambda position: resolve_position(position, context))
+        assert built.lanes == way.lanes
+
+
+def test_lane_position_in_a_junction_determines_the_lane_of_a_waypoint(junction: RoadNetwork) -> None:
+    """At 1 m after its start, the road straight ahead coincides with those to the left and right."""
+    context = RuntimeContext(load_scenario(scenario_xml()), junction, dt=0.1, seed=0)
+    for road in connecting_roads(junction):
+        before = junction.advance(junction.location(road.id, -1, 1.0), -20.0)
+        assert before is not None
+        waypoints = tuple(
+            model.Waypoint(
+                position=model.Position(lane_position=model.LanePosition(road_id=place, lane_id=str(lane), s=s)),
+                route_strategy=model.RouteStrategy.SHORTEST,
+            )
+            for place, lane, s in (before[:3], (road.id, -1, 1.0))
+        )
+        route = model.Route(name="way", closed=False, waypoint=waypoints)
+        lanes = build_route(route, junction, lambda position: resolve_position(position, context)).lanes
+        assert lanes[-1].road == road.id

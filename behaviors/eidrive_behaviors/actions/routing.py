@@ -17,6 +17,7 @@ from eidrive_scenario.api.actions import (
     Goal,
     ResolvedPosition,
     build_route,
+    by_coordinates,
     faces_traffic,
     facing,
     model,
@@ -100,7 +101,9 @@ class AcquirePositionAction(ActionBehaviour):
         here = self.context.location(self.actor.name)
         if self.context.roads is not None and here is not None and target.location is not None:
             try:
-                route = self._route(self.context.roads, here, target.location)
+                near = self.context.roads.lanes_near(target.location)
+                there = near if by_coordinates(self.action.position) else [target.location]
+                route = self._route(self.context.roads, here, self.context.roads.select_lanes([[here], there])[-1])
             except RouteError as error:
                 raise self.error(error.diagnostics[0].message, error.diagnostics[0].hint) from None
             assign_route(self, route)

@@ -241,7 +241,8 @@ class RoutePlanner(Planner):
         on_road = [location for location in locations if location is not None]
         if len(on_road) < len(locations):
             return None
-        line = self.roads.route(on_road[0], on_road[-1], via=on_road[1:-1]).polyline(SPACING)
+        start, *via, end = self.roads.select_lanes([on_road[:1], *map(self.roads.lanes_near, on_road[1:])])
+        line = self.roads.route(start, end, via).polyline(SPACING)
         return np.asarray(line)[:, :2]
 
     def _lane_ahead(self, ego: EgoState) -> PlannedPath:

@@ -27,6 +27,10 @@ from eidrive_scenario.roads import (
 )
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 
+_OF_NO_LANE = (
+    model.WorldPosition, model.RelativeWorldPosition, model.RelativeObjectPosition,
+    model.GeoPosition, model.TrajectoryPosition,
+)  # fmt: skip
 AT_WAYPOINT = 0.01
 """Maximum distance at which an actor is at the first waypoint of a closed route [m]."""
 
@@ -51,16 +55,17 @@ def build_route(
     if roads is None:
         message = f"route {route.name!r}: the scenario has no road network"
         raise ScenarioError(Diagnostic.at(route, message, "specify one in RoadNetwork/LogicFile"))
-    waypoints = []
+    places = []
     for waypoint in route.waypoint:
         here = resolve(waypoint.position).location
         if here is None:
             message = "Waypoint: the position is not on a road"
             raise ScenarioError(Diagnostic.at(waypoint, message, "move it onto a lane"))
-        waypoints.append(here)
-    costs = [_cost(route, number, roads, seed) for number in range(len(waypoints))]
+        places.append(roads.lanes_near(here) if by_coordinates(waypoint.position) else [here])
+    costs = [_cost(route, number, roads, seed) for number in range(len(places))]
     try:
         connect = partial(roads.route, against_traffic=against_traffic)
+        waypoints = roads.select_lanes(places, costs[1:], against_traffic=against_traffic)
         return _connect_waypoints(waypoints, connect, costs, start, closed=again and route.closed)
     except RouteError as error:
         (cause,) = error.diagnostics
@@ -69,6 +74,11 @@ def build_route(
         reopened = ', or set closed="false"' if again and route.closed else ""
         hint = f"{cause.hint}, or " * bool(cause.rule) + f"change its waypoints{reopened}"
         raise ScenarioError(Diagnostic.at(route, message, hint)) from error
+
+
+def by_coordinates(position: model.Position) -> bool:
+    """Return whether a position names no lane, so that it may be on each of several lanes that overlap there."""
+    return isinstance(position.chosen(), _OF_NO_LANE)
 
 
 def faces_traffic(roads: RoadNetwork, position: ResolvedPosition) -> bool:
