@@ -34,9 +34,9 @@ from eidrive_scenario.storyboard.kinematics.motion import LateralStep as Lateral
 from eidrive_scenario.storyboard.kinematics.motion import Motion as Motion
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition as ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.route import build_route as build_route
-from eidrive_scenario.storyboard.kinematics.route import by_coordinates as by_coordinates
 from eidrive_scenario.storyboard.kinematics.route import faces_traffic as faces_traffic
 from eidrive_scenario.storyboard.kinematics.route import random_route as random_route
+from eidrive_scenario.storyboard.kinematics.route import target_lane as target_lane
 from eidrive_scenario.storyboard.kinematics.route import uniform_branch_selector as uniform_branch_selector
 from eidrive_scenario.storyboard.kinematics.trailers import road_train as road_train
 from eidrive_scenario.storyboard.kinematics.trailers import trailers_behind as trailers_behind

@@ -84,7 +84,7 @@ class LaneTracker:
 
     def lane(self, location: LaneLocation) -> Lane:
         """Return the lane of a location."""
-        return self.roads.road(location.road).section_at(location.s).lanes[location.lane]
+        return self.roads.lane(location)
 
     def key(self, location: LaneLocation) -> LaneKey:
         """Return the lane of a location as a node of the lane graph."""

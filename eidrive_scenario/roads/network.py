@@ -1,7 +1,4 @@
-"""Road network: interface to the roads of one OpenDRIVE file.
-
-Routes have the length as cost, or one of the costs here: travel time, junctions, random factors.
-"""
+"""Road network: interface to the roads of one OpenDRIVE file."""
 
 from __future__ import annotations
 
@@ -10,10 +7,9 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cache, cached_property, lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
-from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,7 +29,6 @@ from eidrive_scenario.roads.model.road_map import Junction, Lane, Road, RoadMap,
 from eidrive_scenario.roads.reading import parse_road_map, read_road_text
 from eidrive_scenario.roads.routing.distance import Chain, RoadDistances, locate_near
 from eidrive_scenario.roads.routing.graph import (
-    JUNCTION_COST,
     Cost,
     LaneWays,
     RouteError,
@@ -416,7 +411,7 @@ class RoadNetwork:
         if len(below) < 2:
             return nearest
         if drivable:
-            below = [location for location in below if self._lane(location).drivable] or below
+            below = [location for location in below if self.lane(location).drivable] or below
         aligned = [location for location in below if angle(location) <= ALIGNED]
         # Lanes that part later coincide at first: as on the default route, the one on the road with the smallest turn.
         best = min(aligned, key=lambda location: (round(deviation(location), 3), self._turn(location)), default=nearest)
@@ -427,7 +422,8 @@ class RoadNetwork:
         road = self.road(location.road)
         return abs(wrap_angle(road.reference.at(road.length).h - road.reference.at(0.0).h))
 
-    def _lane(self, location: LaneLocation) -> Lane:
+    def lane(self, location: LaneLocation) -> Lane:
+        """Return the lane of a location. Raise PositionError."""
         return poses.lane_at(self.road(location.road), location.lane, location.s)[1]
 
     def is_on_level(self, location: LaneLocation, z: float) -> bool:
@@ -504,48 +500,6 @@ class RoadNetwork:
             parts.append(Route(self.tables, ordered, a, b, against_traffic=against_traffic))
         return parts[0] if len(parts) == 1 else concatenate_routes(parts)
 
-    def lanes_near(self, location: LaneLocation) -> list[LaneLocation]:
-        """Return a location, and those on other lanes of its junction whose centers are as near to the place.
-
-        Lanes for vehicles on its level count whose center is at most 0.5 m farther than the nearest one.
-        """
-        if self.road(location.road).junction_id is None:
-            return [location]
-        x, y, z, *_ = self.pose(location)
-        lanes = [lane for lane in self.locations_at(x, y) if self._lane(lane).drivable and self.is_on_level(lane, z)]
-        limit = LEAST_GAIN + min((abs(lane.offset) for lane in lanes), default=0.0)
-        return [location, *(lane for lane in lanes if lane[:2] != location[:2] and abs(lane.offset) <= limit)]
-
-    def select_lanes(
-        self,
-        places: Sequence[Sequence[LaneLocation]],
-        costs: Sequence[Cost | None] | None = None,
-        *,
-        against_traffic: bool = False,
-    ) -> list[LaneLocation]:
-        """Return a lane location at each place, such that the route through them is the shortest.
-
-        places  locations from which to select; of equally short routes, that of the first ones is selected
-        costs   cost functions of the legs, as of `route`
-        """
-        if all(len(lanes) == 1 for lanes in places):
-            return [lanes[0] for lanes in places]
-
-        def length(a: LaneLocation, b: LaneLocation, cost: Cost | None) -> float:
-            try:
-                return self.route(a, b, costs=[cost], against_traffic=against_traffic).reference_length
-            except RouteError:
-                return math.inf
-
-        # The shortest ways to each lane of a place extend those to the lanes of the place before.
-        ways = [(0.0, [lane]) for lane in places[0]]
-        for lanes, cost in zip(places[1:], costs or [None] * len(places), strict=False):
-            ways = [
-                min(((done + length(way[-1], lane, cost), [*way, lane]) for done, way in ways), key=itemgetter(0))
-                for lane in lanes
-            ]
-        return min(ways, key=itemgetter(0))[1]
-
     def _find_lanes(self, start: LaneLocation, end: LaneLocation, cost: Cost | None) -> tuple[LaneKey, ...]:
         """Return the lanes of the cheapest route. Raise RouteError; if the file lacks a link for it, with its rule."""
         try:
@@ -604,43 +558,3 @@ class RoadNetwork:
 @lru_cache(maxsize=KEPT)
 def _loaded(text: bytes, source: str) -> RoadNetwork:
     return RoadNetwork(parse_road_map(text, source))
-
-
-MAX_FACTOR = 10.0
-"""Maximum factor by which a random cost exceeds the length."""
-
-
-def fastest(network: RoadNetwork) -> Cost:
-    """Return the travel time at the speed limits [s] as cost."""
-    usual_speed = cache(network.usual_speed)
-
-    def cost(lane: LaneKey, _: LaneKey, data: Mapping[str, Any]) -> float:
-        return float(data["weight"]) / usual_speed(LaneKey(*lane[:3]))
-
-    return cost
-
-
-def fewest_junctions(network: RoadNetwork) -> Cost:
-    """Return a cost by which a junction counts more than any length.
-
-    Routes with equally many junctions are ordered by length.
-    """
-
-    def cost(lane: LaneKey, following: LaneKey, data: Mapping[str, Any]) -> float:
-        before, after = network.road(lane.road).junction_id, network.road(following.road).junction_id
-        return float(data["weight"]) + (JUNCTION_COST if after is not None and after != before else 0.0)
-
-    return cost
-
-
-def random_costs(network: RoadNetwork, generator: np.random.Generator) -> Cost:
-    """Return the length times a random factor of each road as cost [m], so that different draws select different
-    routes.
-    """
-    draws = generator.uniform(0.0, math.log(MAX_FACTOR), len(network.roads)).tolist()
-    factors = {road: math.exp(draw) for road, draw in zip(network.roads, draws, strict=True)}
-
-    def cost(lane: LaneKey, _: LaneKey, data: Mapping[str, Any]) -> float:
-        return float(data["weight"]) * factors[lane.road]
-
-    return cost

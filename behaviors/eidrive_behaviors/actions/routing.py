@@ -17,12 +17,12 @@ from eidrive_scenario.api.actions import (
     Goal,
     ResolvedPosition,
     build_route,
-    by_coordinates,
     faces_traffic,
     facing,
     model,
     random_route,
     resolve_position,
+    target_lane,
     uniform_branch_selector,
 )
 from eidrive_scenario.api.common import EidriveError, LaneLocation, RoadNetwork, Route, RouteError, generator
@@ -101,9 +101,8 @@ class AcquirePositionAction(ActionBehaviour):
         here = self.context.location(self.actor.name)
         if self.context.roads is not None and here is not None and target.location is not None:
             try:
-                near = self.context.roads.lanes_near(target.location)
-                there = near if by_coordinates(self.action.position) else [target.location]
-                route = self._route(self.context.roads, here, self.context.roads.select_lanes([[here], there])[-1])
+                there = target_lane(self.context.roads, here, self.action.position, target.location)
+                route = self._route(self.context.roads, here, there)
             except RouteError as error:
                 raise self.error(error.diagnostics[0].message, error.diagnostics[0].hint) from None
             assign_route(self, route)

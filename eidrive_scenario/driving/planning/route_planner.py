@@ -26,7 +26,7 @@ from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.extensions.settings import parse_settings
-from eidrive_scenario.roads import USUAL_SPEED, LaneLocation, RoadNetwork, RouteError
+from eidrive_scenario.roads import USUAL_SPEED, LaneLocation, RoadNetwork, RouteError, lanes_near, select_lanes
 from eidrive_scenario.sensing.readings import EgoState, SignalReading
 from eidrive_scenario.world.actor import ActorSpec
 
@@ -241,7 +241,8 @@ class RoutePlanner(Planner):
         on_road = [location for location in locations if location is not None]
         if len(on_road) < len(locations):
             return None
-        start, *via, end = self.roads.select_lanes([on_road[:1], *map(self.roads.lanes_near, on_road[1:])])
+        places = [on_road[:1], *(lanes_near(self.roads, location) for location in on_road[1:])]
+        start, *via, end = select_lanes(self.roads, places)
         line = self.roads.route(start, end, via).polyline(SPACING)
         return np.asarray(line)[:, :2]
 

@@ -21,9 +21,6 @@ from eidrive_scenario.roads.routing.links import LaneLinks
 Cost = Callable[[LaneKey, LaneKey, Mapping[str, Any]], float]
 """Cost of an edge of the lane graph: lane, following lane, data of the edge."""
 
-JUNCTION_COST = 1e6
-"""Cost of entering a junction where the fewest junctions are requested [m]; longer than any route."""
-
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -37,6 +34,8 @@ LANE_CHANGE_COST = 10.0
 """Detour that is equivalent to a lane change [m]."""
 SHORT_SECTION_COST = 500.0
 """Additional cost of a lane change times the length of the section [m²]: short sections are unsuitable."""
+JUNCTION_COST = 1e6
+"""Cost of entering a junction where the fewest junctions are requested [m]; longer than any route."""
 MIN_CHANGE_WIDTH = 1.0
 """Minimum width of a lane in the middle of its section for a lane change to it [m]."""
 REACHED_DISTANCE = 0.01

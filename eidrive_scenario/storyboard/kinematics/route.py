@@ -23,7 +23,9 @@ from eidrive_scenario.roads import (
     RouteError,
     fastest,
     fewest_junctions,
+    lanes_near,
     random_costs,
+    select_lanes,
 )
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 
@@ -31,6 +33,7 @@ _OF_NO_LANE = (
     model.WorldPosition, model.RelativeWorldPosition, model.RelativeObjectPosition,
     model.GeoPosition, model.TrajectoryPosition,
 )  # fmt: skip
+"""Positions by coordinates, which may be on each of several lanes that overlap there."""
 AT_WAYPOINT = 0.01
 """Maximum distance at which an actor is at the first waypoint of a closed route [m]."""
 
@@ -61,11 +64,11 @@ def build_route(
         if here is None:
             message = "Waypoint: the position is not on a road"
             raise ScenarioError(Diagnostic.at(waypoint, message, "move it onto a lane"))
-        places.append(roads.lanes_near(here) if by_coordinates(waypoint.position) else [here])
+        places.append(_lanes_of(roads, waypoint.position, here))
     costs = [_cost(route, number, roads, seed) for number in range(len(places))]
     try:
         connect = partial(roads.route, against_traffic=against_traffic)
-        waypoints = roads.select_lanes(places, costs[1:], against_traffic=against_traffic)
+        waypoints = select_lanes(roads, places, costs[1:], against_traffic=against_traffic)
         return _connect_waypoints(waypoints, connect, costs, start, closed=again and route.closed)
     except RouteError as error:
         (cause,) = error.diagnostics
@@ -76,9 +79,18 @@ def build_route(
         raise ScenarioError(Diagnostic.at(route, message, hint)) from error
 
 
-def by_coordinates(position: model.Position) -> bool:
-    """Return whether a position names no lane, so that it may be on each of several lanes that overlap there."""
-    return isinstance(position.chosen(), _OF_NO_LANE)
+def target_lane(
+    roads: RoadNetwork, start: LaneLocation, position: model.Position, location: LaneLocation
+) -> LaneLocation:
+    """Return the lane of a position to which the route is the shortest, where lanes overlap.
+
+    location  lane location to which the position resolves
+    """
+    return select_lanes(roads, [[start], _lanes_of(roads, position, location)])[-1]
+
+
+def _lanes_of(roads: RoadNetwork, position: model.Position, location: LaneLocation) -> list[LaneLocation]:
+    return lanes_near(roads, location) if isinstance(position.chosen(), _OF_NO_LANE) else [location]
 
 
 def faces_traffic(roads: RoadNetwork, position: ResolvedPosition) -> bool:
