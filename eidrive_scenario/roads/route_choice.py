@@ -59,12 +59,16 @@ def random_costs(network: RoadNetwork, generator: np.random.Generator) -> Cost:
     return cost
 
 
-def lanes_near(roads: RoadNetwork, location: LaneLocation) -> list[LaneLocation]:
-    """Return a location, and those on other lanes for vehicles of its junction whose centers are as near."""
-    if roads.road(location.road).junction_id is None:
+def lanes_near(roads: RoadNetwork, location: LaneLocation, *, on_all_levels: bool = False) -> list[LaneLocation]:
+    """Return a location, and those on other lanes for vehicles that overlap there and whose centers are as near.
+
+    The lanes are on the level of the location, as in its junction, or `on_all_levels`, as on and below a bridge.
+    """
+    if roads.road(location.road).junction_id is None and (roads.is_level or not on_all_levels):
         return [location]
     x, y, z, *_ = roads.pose(location)
-    lanes = [lane for lane in roads.locations_at(x, y) if roads.lane(lane).drivable and roads.is_on_level(lane, z)]
+    lanes = [lane for lane in roads.locations_at(x, y) if roads.lane(lane).drivable]
+    lanes = [lane for lane in lanes if on_all_levels or roads.is_on_level(lane, z)]
     limit = AS_NEAR + min((abs(lane.offset) for lane in lanes), default=0.0)
     return [location, *(lane for lane in lanes if lane[:2] != location[:2] and abs(lane.offset) <= limit)]
 

@@ -184,6 +184,28 @@ def test_waypoints_in_a_junction_are_on_the_lanes_of_the_shortest_route(junction
         assert built.lanes == way.lanes
 
 
+@pytest.mark.parametrize("road", ["1", "2"])
+@pytest.mark.parametrize("has_height", [False, True])
+def test_waypoint_where_a_bridge_crosses_is_on_the_road_of_the_route(road: str, has_height: bool) -> None:
+    """Road 1 leads along x, road 2 along y and 6.5 m above."""
+    lower = road_xml("1", length=300.0)
+    upper = road_xml("2", length=300.0, x=150.0, y=-150.0, hdg=math.pi / 2.0, profiles=elevation_xml(6.5, 0.0))
+    roads = RoadNetwork.parse(map_xml(lower, upper))
+    context = RuntimeContext(load_scenario(scenario_xml()), roads, dt=0.1, seed=0)
+    crossing = model.WorldPosition(x=151.75, y=-1.75, z={"1": 0.0, "2": 6.5}[road] if has_height else None)
+    waypoints = tuple(
+        model.Waypoint(position=position, route_strategy=model.RouteStrategy.SHORTEST)
+        for position in (
+            model.Position(lane_position=model.LanePosition(road_id=road, lane_id="-1", s=20.0)),
+            model.Position(world_position=crossing),
+            model.Position(lane_position=model.LanePosition(road_id=road, lane_id="-1", s=280.0)),
+        )
+    )
+    route = model.Route(name="way", closed=False, waypoint=waypoints)
+    built = build_route(route, roads, lambda position: resolve_position(position, context))
+    assert {lane.road for lane in built.lanes} == {road}
+
+
 def test_lane_position_in_a_junction_determines_the_lane_of_a_waypoint(junction: RoadNetwork) -> None:
     """At 1 m after its start, the road straight ahead coincides with those to the left and right."""
     context = RuntimeContext(load_scenario(scenario_xml()), junction, dt=0.1, seed=0)

@@ -90,7 +90,10 @@ def target_lane(
 
 
 def _lanes_of(roads: RoadNetwork, position: model.Position, location: LaneLocation) -> list[LaneLocation]:
-    return lanes_near(roads, location) if isinstance(position.chosen(), _OF_NO_LANE) else [location]
+    frame = position.chosen()
+    if not isinstance(frame, _OF_NO_LANE):
+        return [location]
+    return lanes_near(roads, location, on_all_levels=isinstance(frame, model.WorldPosition) and frame.z is None)
 
 
 def faces_traffic(roads: RoadNetwork, position: ResolvedPosition) -> bool:
