@@ -6,6 +6,7 @@ has changed, its reference line continues in the lane before.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -33,11 +34,13 @@ class RouteLane(NamedTuple):
 
     offsets     distances of its center to the left of the points of the path (M,) [m]
     begin, end  indices of the points between which the vehicle may leave it; the last one after the last change
+    last        index of the last point at which it and the next lane lie beside each other
     """
 
     offsets: Array
     begin: int
     end: int
+    last: int
 
 
 class LaneChange(msgspec.Struct, frozen=True):
@@ -45,24 +48,31 @@ class LaneChange(msgspec.Struct, frozen=True):
 
     begin, end  distances along the line between which the vehicle may change [m]
     offset      distance of the center of the other lane to the left at the vehicle [m]
+    last        distance at which one of both lanes ends [m]; inf if none does before the end of the line
     """
 
     begin: float
     end: float
     offset: float
+    last: float = math.inf
 
     @property
     def name(self) -> str:
         """Name of the maneuver."""
         return lane_change_name(self.offset)
 
-    def wall(self, front: float, lateral_acceleration: float) -> Wall:
+    def wall(self, front: float, lateral_acceleration: float) -> Wall | None:
         """Return the place at which the vehicle stops if it finds no gap, with enough space to change from there.
+
+        Without so much space it is before the end of the lane; None if the lane does not end, as beside a destination.
 
         front  distance of the front from the reference point [m]
         """
-        s = self.end - front - change_length(self.offset, 0.0, lateral_acceleration)
-        return Wall(s, np.inf, "wait for a gap before the end of the lane")
+        space = front + change_length(self.offset, 0.0, lateral_acceleration)
+        s = self.end - space
+        if s < self.begin:
+            s = max(self.last - space, self.begin)
+        return Wall(s, np.inf, "wait for a gap before the end of the lane") if s < math.inf else None
 
     def desire(self, s: float, speed: float) -> float:
         """Return how urgent the change is at a distance along the line [m] and a speed [m/s], in [0, 1]."""
@@ -83,13 +93,15 @@ def route_lanes(line: ReferenceLine) -> list[RouteLane]:
     limit = last
     for number in range(len(crossings) - 1, -1, -1):
         index = crossings[number][0]
-        end = max(min(before[number].last, after[number].last, limit), index)
+        beside = min(before[number].last, after[number].last)
+        beside = beside if beside + STRIDE <= last else last
+        end = max(min(beside, limit), index)
         on_path = np.flatnonzero(np.abs(before[number].offsets[:index]) < OFF_CENTER)
         begin = max(int(on_path[-1]) if on_path.size else 0, after[number].first)
         earlier = None if number == 0 else (after[number - 1], crossings[number - 1][0])
-        lanes.insert(0, RouteLane(_joined(earlier, before[number], index), min(begin, index), end))
+        lanes.insert(0, RouteLane(_joined(earlier, before[number], index), min(begin, index), end, beside))
         limit = end - round(ROOM / line.spacing)
-    return [*lanes, RouteLane(after[-1].offsets, last, last)] if crossings else []
+    return [*lanes, RouteLane(after[-1].offsets, last, last, last)] if crossings else []
 
 
 def _joined(earlier: tuple[_Lane, int] | None, lane: _Lane, index: int) -> Array:

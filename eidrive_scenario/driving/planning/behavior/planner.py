@@ -184,7 +184,8 @@ class BehaviorPlanner(RoutePlanner):
         here, after = self._route_lanes[:2]
         begin, end = (float(line.along[index]) for index in (here.begin, here.end))
         index = line.index_at(min(max(s, begin), end))
-        return LaneChange(begin, end, float(after.offsets[index] - here.offsets[index]))
+        last = math.inf if here.last == len(line.points) - 1 else float(line.along[here.last])
+        return LaneChange(begin, end, float(after.offsets[index] - here.offsets[index]), last)
 
     def _changed_by(self, line: ReferenceLine, x: float, y: float) -> float:
         """Return the distance to the lane of the next change, to the left [m], if the vehicle is in it now; else 0."""

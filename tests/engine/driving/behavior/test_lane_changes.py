@@ -110,6 +110,14 @@ def test_free_lane_is_entered_at_once_without_slowing_down(speed: float) -> None
     assert min(run.speeds) > 0.95 * speed
 
 
+def test_vehicle_without_space_to_change_drives_on_beside_its_destination() -> None:
+    """The lane of the destination begins 12 m before it. No lane ends, so that there is nothing to wait for."""
+    roads = RoadNetwork.parse(map_xml(road_xml(length=200.0, lanes=lanes_xml(1, 1) + lanes_xml(2, 2, s=60.0))))
+    run = drive(roads, LANE, (72.0, LANE - WIDTH), lambda now: [], 25.0, 8.0)
+    assert run.path[-1][0] == pytest.approx(72.0, abs=2.0)
+    assert run.hardest_braking < 5.0
+
+
 def test_vehicle_merges_into_a_column_before_its_lane_ends() -> None:
     """The gaps are of 1.9 s: the vehicle takes one of those beside it."""
     traffic = column(LANE, 14.0, 108.0, 32.0, 8)
