@@ -159,6 +159,8 @@ class Route:
     def _location(self, leg: Leg, s: float) -> LaneLocation:
         road = self.roads[leg.road]
         section = road.sections[leg.section]
+        if s >= section.end and section is not road.sections[-1]:
+            s = math.nextafter(section.end, section.s)  # At its end, lanes have the numbers of the next section
         t = self._t(leg, s)
         lane = min((leg.lane, leg.lane_end), key=lambda n: abs(lane_t(road, section, section.lanes[n], s)[0] - t))
         return LaneLocation(leg.road, lane, s, t - lane_t(road, section, section.lanes[lane], s)[0], t)

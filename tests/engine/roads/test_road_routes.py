@@ -68,6 +68,24 @@ def test_route_prefers_lane_change_to_detour() -> None:
     assert route.location_at(route.length).lane == -2
 
 
+@pytest.mark.parametrize(("start", "end"), [(20.0, 180.0), (180.0, 20.0)], ids=["along s", "against s"])
+def test_locations_where_a_lane_section_ends_are_in_the_route_lane(start: float, end: float) -> None:
+    """From 100 m on there is a further lane inside of that of the route, whose number is one higher."""
+    side = -1 if start < end else 1
+    first = lane_xml(side, 3.5, link=lane_links_xml(after=2 * side))
+    second = [lane_xml(n * side, 3.5, link=lane_links_xml(before=side if n == 2 else None)) for n in (1, 2)]
+    offset = f'<laneOffset s="0" a="0" b="0" c="0" d="0"/><laneOffset s="100" a="{-3.5 * side}" b="0" c="0" d="0"/>'
+    sides = ("", first), ("", "".join(second))
+    sections = [section_xml(*(pair if side < 0 else pair[::-1]), s=s) for pair, s in zip(sides, (0, 100), strict=True)]
+    network = RoadNetwork.parse(map_xml(road_xml(length=200.0, lanes=offset + "".join(sections))))
+    lanes = (side, 2 * side) if start < end else (2 * side, side)
+    route = network.route(network.location("1", lanes[0], start), network.location("1", lanes[1], end))
+    for place in (route.location_at(80.0), route.location_by_reference_line(80.0)):
+        pose = network.pose(place)
+        assert (pose.x, pose.y) == pytest.approx((100.0, side * 1.75), abs=1e-6)
+    assert route.pose_at(80.0)[:2] == pytest.approx((100.0, side * 1.75), abs=1e-6)
+
+
 def test_route_to_goal_behind_the_start_goes_round() -> None:
     network = ring()
     for lane in (-1, -2):
