@@ -25,6 +25,8 @@ OFF_CENTER = 0.1
 """Distance of a path from the center of its lane from which on it changes lanes [m]."""
 ROOM = 50.0
 """Length that is kept for each later change between the same lanes [m]."""
+BEFORE_WALL = 0.5
+"""Maximum distance before a place to stop at which the vehicle stands [m]."""
 DISTANCE, TIME = 295.0, 43.0
 """Distance [m] and time [s] before the end of the lane at which a change becomes desired, by LMRS (Schakel 2012)."""
 
@@ -69,9 +71,9 @@ class LaneChange(msgspec.Struct, frozen=True):
         front  distance of the front from the reference point [m]
         """
         space = front + change_length(self.offset, 0.0, lateral_acceleration)
-        s = self.end - space
-        if s < self.begin:
-            s = max(self.last - space, self.begin)
+        s, first = self.end - space, self.begin + BEFORE_WALL
+        if s < first:
+            s = max(self.last - space, first)
         return Wall(s, np.inf, "wait for a gap before the end of the lane") if s < math.inf else None
 
     def desire(self, s: float, speed: float) -> float:
