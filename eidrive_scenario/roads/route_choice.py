@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from functools import cache
 from operator import itemgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -95,10 +95,25 @@ def select_lanes(
             return math.inf
 
     # The shortest ways to each lane of a place extend those to the lanes of the place before.
-    ways = [(0.0, [lane]) for lane in places[0]]
+    ways: list[tuple[float, _Way]] = [(0.0, _Way(lane)) for lane in places[0]]
     for lanes, cost in zip(places[1:], costs or [None] * len(places), strict=False):
+        if len(ways) == len(lanes) == 1:
+            ways = [(0.0, _Way(lanes[0], ways[0][1]))]
+            continue
         ways = [
-            min(((done + length(way[-1], lane, cost), [*way, lane]) for done, way in ways), key=itemgetter(0))
+            min(((done + length(way.lane, lane, cost), _Way(lane, way)) for done, way in ways), key=itemgetter(0))
             for lane in lanes
         ]
-    return min(ways, key=itemgetter(0))[1]
+    selected: list[LaneLocation] = []
+    step: _Way | None = min(ways, key=itemgetter(0))[1]
+    while step is not None:
+        selected.append(step.lane)
+        step = step.before
+    return selected[::-1]
+
+
+class _Way(NamedTuple):
+    """Way to a lane, over the lanes of the places before."""
+
+    lane: LaneLocation
+    before: _Way | None = None
