@@ -45,10 +45,10 @@ if TYPE_CHECKING:
 
 
 FREE_SPEED = 130.0 / 3.6
-"""Assumed speed where the speed is not limited [m/s]: the recommended one on German motorways."""
+"""Usual speed where the speed is not limited [m/s]: the recommended one on German motorways."""
 USUAL_SPEED = 50.0 / 3.6
 USUAL_SPEEDS = {"motorway": FREE_SPEED, "rural": 100.0 / 3.6, "lowSpeed": 30.0 / 3.6}
-"""Assumed speeds on roads of a type, and on others, without a stated limit [m/s]: the general limits in Germany."""
+"""Usual speeds on roads of a type, and on others, without a stated limit [m/s]: the general limits in Germany."""
 KEPT = 2
 """Maximum number of road networks that are kept for the next run."""
 OTHER_LEVEL = 3.5
@@ -79,7 +79,7 @@ class RoadNetwork:
         self._reading_warnings = road_map.map_warnings
         self.links = LaneLinks(road_map)
         self.movement = Movement(self.roads, self.links)
-        self._distances = RoadDistances(self.roads, self.links, self._usual_speed)
+        self._distances = RoadDistances(self.roads, self.links, self._usual_speed_on)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> RoadNetwork:
@@ -195,18 +195,18 @@ class RoadNetwork:
         kind = road.type_at(s)
         return None if kind is None else kind.speed
 
-    def assumed_speed(self, road_id: str, s: float, lane_id: int | None = None) -> float:
-        """Return the speed of traffic at s [m/s]: the limit, else that which is usual on a road of this type."""
+    def usual_speed(self, road_id: str, s: float, lane_id: int | None = None) -> float:
+        """Return the usual speed of traffic at s [m/s]: the limit, else that on roads of this type."""
         limit = self.speed_limit(road_id, s, lane_id)
         if limit:
             return min(limit, FREE_SPEED)
         kind = self.road(road_id).type_at(s)
         return USUAL_SPEED if kind is None else USUAL_SPEEDS.get(kind.type, USUAL_SPEED)
 
-    def usual_speed(self, key: LaneKey) -> float:
-        """Return the speed of traffic that is assumed in the middle of a lane [m/s]."""
+    def usual_speed_in(self, key: LaneKey) -> float:
+        """Return the usual speed of traffic in the middle of a lane [m/s]."""
         section = self.road(key.road).sections[key.section]
-        return self.assumed_speed(key.road, 0.5 * (section.s + section.end), key.lane)
+        return self.usual_speed(key.road, 0.5 * (section.s + section.end), key.lane)
 
     def on_road(self, location: LaneLocation) -> bool:
         """Return True if the location is within the width of its lane."""
@@ -399,15 +399,13 @@ class RoadNetwork:
         def deviation(location: LaneLocation) -> float:
             return abs(location.offset) + FRONT * angle(location)
 
-        is_on_level = self.is_level or (z is not None and self.is_on_level(nearest, z))
-        is_alone = self.road(nearest.road).junction_id is None
+        is_on_level = z is None or self.is_on_level(nearest, z)
+        is_alone = self.road(nearest.road).junction_id is None and (self.is_level or z is not None)
         if is_on_level and (is_alone or (hint is not None and deviation(nearest) <= LEAST_GAIN)):
             return nearest
-        below = self.locations_at(x, y)
-        if z is not None:
-            below = [location for location in below if self.is_on_level(location, z)]
-            if not self.is_on_level(nearest, z):
-                nearest = min(below, key=deviation, default=self.locate_at(x, y, z=z) or nearest)
+        below = [location for location in self.locations_at(x, y) if z is None or self.is_on_level(location, z)]
+        if not is_on_level:
+            nearest = min(below, key=deviation) if below else self.locate_at(x, y, z=z) or nearest
         if len(below) < 2:
             return nearest
         if drivable:
@@ -543,8 +541,8 @@ class RoadNetwork:
         runs = self.orientation(a, b)
         return None if runs is None else lanes_between(self.roads, self.links, a, b, runs)
 
-    def _usual_speed(self, road: str) -> float:
-        return self.assumed_speed(road, 0.5 * self.road(road).length)
+    def _usual_speed_on(self, road: str) -> float:
+        return self.usual_speed(road, 0.5 * self.road(road).length)
 
     def bounds(self) -> tuple[float, float, float, float]:
         """Return the bounding rectangle of all lane centers: minimum x and y, maximum x and y [m]; 0 without lanes."""

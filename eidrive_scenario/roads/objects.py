@@ -89,8 +89,7 @@ def _corners(network: RoadNetwork, placed: PlacedObject, outline: tuple[Corner, 
 def _pose(network: RoadNetwork, road_object: RoadObject, s: float, t: float, z_offset: float) -> Pose:
     length = network.roads[road_object.road].length
     pose = network.road_pose_at(road_object.road, min(max(s, 0.0), length), t)
-    turn = road_object.heading
-    return pose._replace(z=pose.z + z_offset).turned(turn)
+    return pose._replace(z=pose.z + z_offset).turned(road_object.heading)
 
 
 def _repeated(network: RoadNetwork, road_object: RoadObject) -> Iterator[PlacedObject]:

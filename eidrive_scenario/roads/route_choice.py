@@ -25,7 +25,7 @@ MAX_FACTOR = 10.0
 
 def fastest(network: RoadNetwork) -> Cost:
     """Return the travel time at the speed limits [s] as cost."""
-    usual_speed = cache(network.usual_speed)
+    usual_speed = cache(network.usual_speed_in)
 
     def cost(lane: LaneKey, _: LaneKey, data: Mapping[str, Any]) -> float:
         return float(data["weight"]) / usual_speed(LaneKey(*lane[:3]))

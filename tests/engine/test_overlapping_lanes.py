@@ -54,8 +54,8 @@ def test_vehicle_in_a_junction_follows_the_lane_along_its_heading(
     junction: RoadNetwork, x: float, y: float, yaw: float, turn: float
 ) -> None:
     """The connecting roads straight ahead lead from each arm to the opposite one, whose lane is straight on."""
-    place = junction.locate_pose(x, y, yaw + turn, 0.0, drivable=True)
-    assert place is not None
+    location = junction.locate_pose(x, y, yaw + turn, 0.0, drivable=True)
+    assert location is not None
     end = end_of_plan(junction, state(x, y, yaw + turn))
     ahead, aside = math.cos(yaw), math.sin(yaw)
     assert (end[0] - x) * ahead + (end[1] - y) * aside > 30.0
@@ -69,8 +69,8 @@ def test_scripted_vehicle_in_a_junction_follows_the_lane_along_its_heading(
     """It is on the center of a lane, which it follows for 50 m."""
     for road in connecting_roads(junction):
         for share in (0.3, 0.5, 0.7):
-            place = junction.location(road.id, -1, share * road.length)
-            pose = junction.pose(place)
+            location = junction.location(road.id, -1, share * road.length)
+            pose = junction.pose(location)
             motion = Motion(junction)
             if teleports:
                 context = RuntimeContext(load_scenario(scenario_xml()), junction, dt=0.1, seed=0)
@@ -80,10 +80,10 @@ def test_scripted_vehicle_in_a_junction_follows_the_lane_along_its_heading(
                 motion.move_to(pose, land=True)
             motion.set_speed(5.0)
             end = [motion.step(0.1) for _ in range(101)][-1]
-            ahead = junction.advance(place, 50.0)
+            ahead = junction.advance(location, 50.0)
             assert ahead is not None
             expected = junction.pose(ahead)
-            assert math.hypot(end.x - expected.x, end.y - expected.y) < 0.3, place
+            assert math.hypot(end.x - expected.x, end.y - expected.y) < 0.3, location
 
 
 def test_location_in_a_junction_moves_to_the_lane_that_the_vehicle_follows(junction: RoadNetwork) -> None:
@@ -120,9 +120,9 @@ def test_vehicle_where_a_bridge_crosses_follows_its_own_road(bridge: str, ground
     roads = RoadNetwork.parse(map_xml(along, across))
     for road, yaw in (("1", 0.0), ("2", math.pi / 2.0)):
         for turn in (-0.7, 0.0, 0.7):
-            place = roads.locate_pose(151.75, -1.75, yaw + turn, heights[road], drivable=True)
-            assert place is not None
-            assert place.road == road
+            location = roads.locate_pose(151.75, -1.75, yaw + turn, heights[road], drivable=True)
+            assert location is not None
+            assert location.road == road
 
 
 @pytest.mark.parametrize("driven", [False, True])
@@ -137,15 +137,15 @@ def test_vehicle_that_starts_where_a_bridge_crosses_keeps_its_height(
     (tmp_path / "bridge.xodr").write_text(map_xml(lower, upper))
     x, y, z, yaw = (151.0, -1.75, 0.0, 0.0) if road == "1" else (151.75, -1.2, 6.5, math.pi / 2.0)
     height = f'z="{z}"' if position == "world" else ""
-    place = f'<WorldPosition x="{x}" y="{y}" h="{yaw}" {height}/>'
+    position_xml = f'<WorldPosition x="{x}" y="{y}" h="{yaw}" {height}/>'
     if position == "lane":
-        place = lane_position_xml(-1, x if road == "1" else y + 150.0, road)
+        position_xml = lane_position_xml(-1, x if road == "1" else y + 150.0, road)
     path = tmp_path / "bridge.xosc"
     path.write_bytes(
         scenario_xml(
             road=road_file_xml("bridge.xodr"),
             entities=object_xml("Ego", controller=agent_xml(detector="oracle") if driven else ""),
-            init=init_xml("Ego", teleport_xml(place), speed_xml(5)),
+            init=init_xml("Ego", teleport_xml(position_xml), speed_xml(5)),
             stop=end_xml(2.0),
         )
     )
@@ -214,10 +214,10 @@ def test_lane_position_in_a_junction_determines_the_lane_of_a_waypoint(junction:
         assert before is not None
         waypoints = tuple(
             model.Waypoint(
-                position=model.Position(lane_position=model.LanePosition(road_id=place, lane_id=str(lane), s=s)),
+                position=model.Position(lane_position=model.LanePosition(road_id=road_id, lane_id=str(lane), s=s)),
                 route_strategy=model.RouteStrategy.SHORTEST,
             )
-            for place, lane, s in (before[:3], (road.id, -1, 1.0))
+            for road_id, lane, s in (before[:3], (road.id, -1, 1.0))
         )
         route = model.Route(name="way", closed=False, waypoint=waypoints)
         lanes = build_route(route, junction, lambda position: resolve_position(position, context)).lanes

@@ -189,7 +189,7 @@ class RoutePlanner(Planner):
             before = self._location
             here = _lane_below(self.roads, ego) if before is None else self.roads.locate_at(x, y, before)
             self._location = here
-            usual = USUAL_SPEED if here is None else self.roads.assumed_speed(here.road, here.s, here.lane)
+            usual = USUAL_SPEED if here is None else self.roads.usual_speed(here.road, here.s, here.lane)
             return min(usual, self.spec.max_speed)
         if self._first_speed is None:
             self._first_speed = max(ego.speed, 0.0)

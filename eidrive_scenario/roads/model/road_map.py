@@ -69,7 +69,6 @@ class RoadObject(msgspec.Struct, frozen=True):
     heading: float
     pitch: float
     roll: float
-    orientation: str
     length: float
     width: float
     height: float

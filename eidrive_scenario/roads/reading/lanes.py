@@ -233,7 +233,7 @@ def _read_marks(element: etree._Element, begin: float, collector: AttributeReade
         weight = mark.get("weight", "standard")
         width = collector.mark_number(mark, "width", None) or MARK_WIDTHS.get(weight, 0.12)
         lines = [_read_line(line, width, collector) for line in mark.iterfind("type/line")]
-        lines += [_read_line(line, width, collector, math.inf) for line in mark.iterfind("explicit/line")]
+        lines += [_read_line(line, width, collector, ("length",)) for line in mark.iterfind("explicit/line")]
         if mark.get("type") is None:
             collector.report_mark_warning(mark, "<roadMark> lacks the attribute 'type'")
         yield RoadMark(
@@ -248,17 +248,17 @@ def _read_marks(element: etree._Element, begin: float, collector: AttributeReade
 
 
 def _read_line(
-    line: etree._Element, usual: float, collector: AttributeReader, space: float | None = None
+    line: etree._Element, usual: float, collector: AttributeReader, dashes: tuple[str, ...] = ("length", "space")
 ) -> RoadMarkLine | None:
     """Return a line of a road mark, or None if its dashes are missing, as then the type of the mark defines the
     pattern.
 
-    usual  width if the line has none [m]
-    space  space after a dash, if the line has no attribute for it [m]
+    usual   width if the line has none [m]
+    dashes  attributes of its dashes; without `space` there is only one
     """
-    missing = [name for name in ("length", "space")[: 2 if space is None else 1] if line.get(name) is None]
+    missing = [name for name in dashes if line.get(name) is None]
     length = collector.mark_number(line, "length", None)
-    space = collector.mark_number(line, "space", None) if space is None else space
+    space = collector.mark_number(line, "space", None) if "space" in dashes else math.inf
     if missing:
         names = " and ".join(repr(name) for name in missing)
         collector.report_mark_warning(line, f"<line> lacks the attribute {names}")

@@ -151,7 +151,6 @@ def read_object(road: str, element: etree._Element, collector: AttributeReader) 
         heading=number("hdg"),
         pitch=number("pitch"),
         roll=number("roll"),
-        orientation=element.get("orientation", "none"),
         length=number("length"),
         width=number("width"),
         height=number("height"),

@@ -218,11 +218,11 @@ class Actor:
     def location(self, roads: RoadNetwork, tick: int) -> LaneLocation | None:
         """Return its lane location, None without a road nearby. It is computed once per tick."""
         if self._location_tick != tick:
-            (x, y, z, h, _, _), of_motion = self.motion.pose, None if self.driven else self.motion.location
-            if of_motion is not None:
-                self._location = roads.locate_at(x, y, of_motion)
-            else:
+            x, y, z, h, _, _ = self.motion.pose
+            if self.driven or self.motion.location is None:
                 self._location = roads.locate_pose(x, y, h, z, self._location)
+            else:
+                self._location = roads.locate_at(x, y, self.motion.location)
             self._location_tick = tick
         return self._location
 

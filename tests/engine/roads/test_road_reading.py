@@ -238,11 +238,11 @@ def test_speed_limit_of_lane_overrides_road() -> None:
         ("", 50.0),
     ],
 )
-def test_assumed_speed_is_the_limit_or_that_of_the_road_type(kind: str, expected: float) -> None:
+def test_usual_speed_is_the_limit_or_that_of_the_road_type(kind: str, expected: float) -> None:
     """Without a limit it is the general one of German law: 50 km/h in towns, 100 outside, 130 recommended, zone 30."""
     network = RoadNetwork.parse(map_xml(road_xml(extra=kind)))
-    assert network.assumed_speed("1", 10.0) == pytest.approx(expected / 3.6)
-    assert network.assumed_speed("1", 10.0, -1) == pytest.approx(expected / 3.6)
+    assert network.usual_speed("1", 10.0) == pytest.approx(expected / 3.6)
+    assert network.usual_speed("1", 10.0, -1) == pytest.approx(expected / 3.6)
 
 
 SIGNALS = (

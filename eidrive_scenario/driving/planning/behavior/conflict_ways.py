@@ -119,7 +119,7 @@ class ConflictWays:
                 for chain in self._upstream([key], 0.0):
                     course = self._courses.course_of(chain)
                     if course is not None:
-                        lanes.append((tuple(chain), course, max(map(self._roads.usual_speed, chain))))
+                        lanes.append((tuple(chain), course, max(map(self._roads.usual_speed_in, chain))))
         return lanes
 
     @cached_property

@@ -26,7 +26,7 @@ OFF_CENTER = 0.1
 ROOM = 50.0
 """Length that is kept for each later change between the same lanes [m]."""
 BEFORE_WALL = 0.5
-"""Maximum distance before a place to stop at which the vehicle stands [m]."""
+"""Distance of a place to wait behind that from which the vehicle may change [m]: it stops centimeters before it."""
 DISTANCE, TIME = 295.0, 43.0
 """Distance [m] and time [s] before the end of the lane at which a change becomes desired, by LMRS (Schakel 2012)."""
 

@@ -137,7 +137,7 @@ class ReferenceLine:
         for index, (x, y) in enumerate(self.points.tolist()):
             location = roads.locate_at(x, y, location, self._height(index), reach=5.0)
             if location is not None:
-                limits[index] = roads.assumed_speed(location.road, location.s, location.lane)
+                limits[index] = roads.usual_speed(location.road, location.s, location.lane)
         return limits
 
     @property
