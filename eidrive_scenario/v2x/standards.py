@@ -1,4 +1,4 @@
-"""Constants and durations of IEEE 802.11p and C-V2X Mode 4 that the radio channel and the analytic models share."""
+"""Constants and durations of IEEE 802.11p and the sidelinks that the radio channel and the analytic models share."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ RESOURCE_BLOCKS = 50
 """Number of resource blocks in 10 MHz (3GPP TS 36.101, table 5.6-1)."""
 CANDIDATE_SHARE = 0.2
 """Minimum share of candidate resources after exclusion, and share that is reported (3GPP TS 36.213, 14.1.1.6)."""
-SENSING_DBM: Mapping[str, float] = {"80211p": -85.0, "cv2x_mode4": -90.5}
-"""Minimum sensed power of each technology [dBm], as in the published analytic models of both."""
+SENSING_DBM: Mapping[str, float] = {"80211p": -85.0, "cv2x_mode4": -90.5, "nr_v2x_mode2": -130.0}
+"""Minimum sensed power of each technology [dBm], as in the published analytic models of the first two.
+
+With NR-V2X the control channel decides: the minimum is far below the noise of one resource block."""
 NOISE_DBM = -95.0
 """Noise in 10 MHz at a noise figure of 9 dB [dBm]."""
 ANTENNA_HEIGHT = 1.5

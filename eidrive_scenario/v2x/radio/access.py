@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import numpy as np
@@ -48,13 +48,29 @@ class Transmission:
     bands: int = 1
     """Number of subchannels, from `first_band` on."""
     reserves: bool = False
-    """Whether the control information reserves the resource for another transmission."""
+    """Whether the control information reserves the resource for the next message."""
+    copy: int = 0
+    """Number of earlier transmissions of the same message."""
+    later: Sequence[tuple[int, int]] = ()
+    """Slots from here to each later transmission of the message, and its first subchannel."""
+    decided: set[str] = field(default_factory=set)
+    """Receivers whose outcome an earlier transmission of the message decided; one set for all of them."""
     gain: Array | None = None
     """Fading gain at each station (N,) [dB]; None without fading."""
     busy: Bools | None = None
     """Stations that are locked to an earlier message at the start (N,); None without preamble detection."""
     control: NDArray[np.int8] | None = None
     """Outcome of the control information at each station (N,), as cause of loss or 0; None without it."""
+
+    @property
+    def draw_number(self) -> int:
+        """Number of the random draws of this transmission; that of the message for the first."""
+        return self.message.number + (self.copy << 40)
+
+    @property
+    def undecided(self) -> Sequence[str]:
+        """Receivers whose outcome no earlier transmission of the message decided."""
+        return [name for name in self.receivers if name not in self.decided] if self.decided else self.receivers
 
 
 class MediumAccess(ABC):
@@ -220,16 +236,17 @@ class MediumAccess(ABC):
         self.contending += bool(queue) - (self._head[row] is not None)
         self._head[row] = first = queue[0] if queue else None
         opens = self._last_start[row] + self.interval(row)
-        self.ready[row] = math.inf if first is None else max(first.ready, opens)
+        self.ready[row] = math.inf if first is None else first.ready if first.copy else max(first.ready, opens)
         self.reset_event(row)
 
     def _begin(self, row: int, transmission: Transmission, start: float) -> None:
         """Start the transmission of the first message in the queue of a station."""
         transmission.start, transmission.end = start, start + transmission.duration
         if self.fading is not None:
-            transmission.gain = self.fading.gain_db(row, transmission.message.number)
+            transmission.gain = self.fading.gain_db(row, transmission.draw_number)
         self._waiting[row].popleft()
-        self._last_start[row], self._last_use[row] = start, transmission.duration * self.share(transmission)
+        used = transmission.duration * self.share(transmission)
+        self._last_start[row], self._last_use[row] = start, used + (self._last_use[row] if transmission.copy else 0.0)
         self.active.append(transmission)
 
     def _measure(self, now: float) -> None:
@@ -256,14 +273,14 @@ def reorder_fields(owner: object, rows: Sequence[int | None], **fresh: float) ->
     """
     kept = [new for new, old in enumerate(rows) if old is not None]
     former = [old for old in rows if old is not None]
-    for field, value in fresh.items():
-        values = getattr(owner, field)
+    for name, value in fresh.items():
+        values = getattr(owner, name)
         if values is not None:
             reordered = np.full((*values.shape[:-1], len(rows)), value, dtype=values.dtype)
             reordered[..., kept] = values[..., former]
-            setattr(owner, field, reordered)
+            setattr(owner, name, reordered)
 
 
 def _is_outdated(transmission: Transmission, *, by: Transmission) -> bool:
-    """Return True if another message of the same kind was sent in a later tick."""
-    return transmission.sent < by.sent and transmission.message.kind == by.message.kind
+    """Return True if another message of the same kind was sent in a later tick, and no transmission has started."""
+    return not transmission.copy and transmission.sent < by.sent and transmission.message.kind == by.message.kind

@@ -26,11 +26,13 @@ from eidrive_scenario.v2x.radio.events import DroppedBlock, LinkCounterTable, Re
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio.reception import DELIVERED, Receiver
 from eidrive_scenario.v2x.radio.sidelink.medium import Sidelink
-from eidrive_scenario.v2x.radio_environment import RadioEnvironment
+from eidrive_scenario.v2x.radio_environment import LOS, RadioEnvironment
 from eidrive_scenario.v2x.statistics.link_events import LinkEvents, OutcomeBlock
 from eidrive_scenario.v2x.statistics.link_statistics import ABSENT, LinkStatistics
 from eidrive_scenario.v2x.statistics.reception_log import queue_entry
 
+UNDECODABLE = 0.9
+"""Packet error rate from which a receiver does not lock to a message (preamble detection as in WiLabV2Xsim)."""
 ENERGY_DETECTION_DBM = -65.0
 """Power of any signal from which a station senses a busy channel of 10 MHz [dBm] (IEEE 802.11-2012, 18.3.10.6)."""
 
@@ -60,7 +62,9 @@ class RadioChannel(QueuedChannel):
         self._fading = FadingDraws(profile.fading, seed) if isinstance(profile.fading, Nakagami) else None
         access = profile.queue, DccGate(profile.congestion, 0, self._background_ratio), profile.sensing, seed
         self._access: MediumAccess = (
-            Csma(*access) if profile.technology == "80211p" else Sidelink(*access, profile.sidelink, profile.noise_dbm)
+            Csma(*access, profile.noise_dbm, profile.curves[LOS].ratio_of(UNDECODABLE))
+            if profile.pool is None
+            else Sidelink(*access, profile.pool, profile.noise_dbm)
         )
         self._access.fading = self._fading
         self._counters = LinkCounterTable(())
@@ -183,7 +187,7 @@ class RadioChannel(QueuedChannel):
         if self._fading is not None:
             self._fading.rearrange(names)
         for transmission in [*lost, *gone]:
-            for receiver in transmission.receivers:
+            for receiver in transmission.undecided:
                 self._dropped.append(self._links.lose(transmission.message, receiver, transmission.sent, ABSENT))
 
     def _advance(self, now: float) -> None:
@@ -228,8 +232,12 @@ class RadioChannel(QueuedChannel):
         plain = isinstance(self.profile.loss, NoLoss)
         receivers = []
         for index, transmission in enumerate(ended):
-            present = self._rows_of(transmission.message.sender, transmission.receivers)
-            self._record_absent(transmission, present)
+            present = self._rows_of(transmission.message.sender, transmission.undecided)
+            if transmission.later:
+                present = present[receptions.causes[index, present] == DELIVERED]
+                transmission.decided.update(budget.names[row] for row in present.tolist())
+            else:
+                self._record_absent(transmission, present)
             receivers.append(
                 present if plain else self._apply_loss(transmission, present, receptions.causes[index], budget)
             )
@@ -286,7 +294,7 @@ class RadioChannel(QueuedChannel):
         return np.array(remaining, dtype=np.int64)
 
     def _record_absent(self, transmission: Transmission, present: Integers) -> None:
-        if len(present) < len(transmission.receivers):
-            for name in transmission.receivers:
+        if len(present) < len(transmission.undecided):
+            for name in transmission.undecided:
                 if name not in self._rows:
                     self._dropped.append(self._links.lose(transmission.message, name, transmission.sent, ABSENT))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eidrive_scenario.base.arrays import Bools
+from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.counter_random import Keys, key, uniforms
 from eidrive_scenario.v2x.radio.access import MediumAccess, QueueSettings, Transmission, reorder_fields
@@ -26,13 +26,27 @@ class Csma(MediumAccess):
 
     Stations that start within one slot of each other cannot sense each other, and their transmissions overlap.
 
-    A station locks to a message up to its end, unless it is locked or transmits already. It stops to receive when it
-    starts to transmit. Of messages that start at the same time none is earlier: they interfere with each other.
+    A station locks to a message up to its end, unless it is locked or transmits already, or the interference at the
+    start is too strong to decode it. It stops to receive when it starts to transmit. Of messages that start at the same
+    time none is earlier: they interfere with each other.
+
+    noise_dbm     noise in the channel
+    decodable_db  minimum ratio of the signal to noise and interference at the start
     """
 
-    def __init__(self, queue: QueueSettings, gate: DccGate, sensing_dbm: float, seed: int) -> None:
+    def __init__(
+        self,
+        queue: QueueSettings,
+        gate: DccGate,
+        sensing_dbm: float,
+        seed: int,
+        noise_dbm: float,
+        decodable_db: float,
+    ) -> None:
         super().__init__(queue, gate, sensing_dbm)
         self._seed = seed
+        self._noise, self._sensed = 10.0 ** (noise_dbm / 10.0), 10.0 ** (sensing_dbm / 10.0)
+        self._decodable = 10.0 ** (decodable_db / 10.0)
         self._slots = np.zeros(0)
         """Remaining backoff of the first message of each station [slots]; NaN if it met no busy medium."""
         self._fixed = np.zeros(0)
@@ -67,8 +81,7 @@ class Csma(MediumAccess):
         transmission = self._head[row]
         assert transmission is not None
         self._begin(row, transmission, time)
-        power = self.power[row] if transmission.gain is None else self.power[row] + transmission.gain
-        sensed = power >= self.sensing_dbm
+        sensed = self._received(transmission) >= self.sensing_dbm
         sensed[row] = True
         end = transmission.end
         self._period_busy += np.where(sensed, np.maximum(0.0, end - np.maximum(time, self._free_from)), 0.0)
@@ -105,16 +118,22 @@ class Csma(MediumAccess):
             together, pending = pending[:count], pending[count:]
             busy = self._locked_until > instant
             locked_until = self._locked_until.copy()
-            for transmission in together:
-                transmission.busy = busy
-                received = self.power[self._rows[transmission.message.sender]]
-                if transmission.gain is not None:
-                    received = received + transmission.gain
-                locks = ~busy & (received >= self.sensing_dbm)
-                locked_until[locks] = np.maximum(locked_until[locks], transmission.end)
+            on_air = [each for each in self.active if each.start <= instant < each.end]
+            received = 10.0 ** (np.array([self._received(each) for each in on_air]) / 10.0)
+            total = self._noise + received.sum(axis=0)
+            for transmission, power in zip(on_air, received, strict=True):
+                if transmission in together:
+                    transmission.busy = busy
+                    locks = ~busy & (power >= self._sensed) & (power >= self._decodable * (total - power))
+                    locked_until[locks] = np.maximum(locked_until[locks], transmission.end)
             for transmission in together:
                 locked_until[self._rows[transmission.message.sender]] = transmission.end
             self._locked_until = locked_until
+
+    def _received(self, transmission: Transmission) -> Array:
+        """Return the received power of a transmission at each station (N,) [dBm]."""
+        power: Array = self.power[self._rows[transmission.message.sender]]
+        return power if transmission.gain is None else power + transmission.gain
 
     def reorder(self, rows: Sequence[int | None]) -> None:
         reorder_fields(self, rows, _slots=math.nan, _fixed=math.nan, _free_from=-math.inf, _locked_until=-math.inf)

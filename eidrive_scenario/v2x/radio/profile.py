@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -18,18 +17,17 @@ from eidrive_scenario.v2x.propagation import Fading, LinkGeometry, NoFading, Pat
 from eidrive_scenario.v2x.radio.access import QueueSettings
 from eidrive_scenario.v2x.radio.congestion import CongestionControl, NoDcc
 from eidrive_scenario.v2x.radio.packet_error import CURVE_RATE_MBPS, CURVES, ErrorCurve
+from eidrive_scenario.v2x.radio.resource_pool import NrSidelinkSettings, Pool, SidelinkSettings
 from eidrive_scenario.v2x.standards import (
     ANTENNA_HEIGHT,
     BITS_PER_SYMBOL,
     NOISE_DBM,
-    RESOURCE_BLOCKS,
     SENSING_DBM,
     SENSITIVITIES,
-    SUBFRAME,
     ieee80211p_airtime,
 )
 
-Technology = Literal["80211p", "cv2x_mode4"]
+Technology = Literal["80211p", "cv2x_mode4", "nr_v2x_mode2"]
 Level = Annotated[float, Field(ge=-200.0, le=100.0)]
 """Received power [dBm]."""
 Background = Annotated[Ieee80211pLoss | Cv2xMode4Loss, Field(discriminator="kind")]
@@ -38,106 +36,12 @@ _CURVES = {
     "80211p": ("80211p_highway_los", "80211p_highway_nlos", "80211p_crossing_nlos"),
     "cv2x_mode4": ("cv2x_r0.7",) * 3,
 }
-_IDLE = {"80211p": {"sidelink"}, "cv2x_mode4": {"data_rate_mbps", "mtu", "jammers"}}
+_IDLE = {
+    "80211p": {"sidelink", "nr_sidelink"},
+    "cv2x_mode4": {"nr_sidelink", "data_rate_mbps", "mtu", "jammers"},
+    "nr_v2x_mode2": {"sidelink", "data_rate_mbps", "mtu", "jammers", "background"},
+}
 """Settings without effect, by technology."""
-
-
-INTERVALS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
-"""Resource reservation intervals [s]."""
-PSCCH_BLOCKS = 2
-"""Number of resource blocks of the control channel in the first subchannel (3GPP TS 36.213, 14.2)."""
-MAX_SELECTION_WINDOW = 0.1
-"""Maximum T2 [s] (3GPP TS 36.213, 14.1.1.6)."""
-
-
-class SidelinkSettings(Settings):
-    """Settings of the resource pool of C-V2X Mode 4 (10 MHz) and of the resource selection.
-
-    interval      resource reservation interval [s]
-    subchannels   number of subchannels in 10 MHz
-    subchannel_bytes   capacity of one subchannel in a subframe of 1 ms [bytes]
-    resource_keep_probability   probability of keeping the resource when the reselection counter reaches 0
-                  (probResourceKeep)
-    processing    time from the message to the earliest subframe that can carry it [s]; T1 of the selection window
-    selection_window   T2, the end of the selection window, after the request [s]; None: the interval, at most 100 ms
-    latency       latency requirement [s]: if the next reserved resource is later than this after the message could be
-                  sent, the station selects a new one
-    reselect_after     number of consecutive unused resources after which a station selects a new one
-                  (sl-ReselectAfter); None: no such limit
-    pssch_rsrp_threshold_dbm   SL-ThresPSSCH-RSRP, above which a decoded reservation excludes resources; it is raised by
-                  3 dB while less than 20 % remain [dBm per resource element]
-    cbr_threshold_dbm  S-RSSI above which a subchannel counts as busy [dBm] (ETSI TS 103 574, 5.2)
-    pscch_errors  name of the packet error curve of the control channel
-    """
-
-    interval: float = 0.1
-    subchannels: Annotated[int, Field(ge=1, le=20)] = 4
-    subchannel_bytes: Annotated[int, Field(ge=1)] = 190
-    resource_keep_probability: Annotated[float, Field(ge=0.0, le=0.8)] = 0.0
-    processing: Annotated[float, Field(ge=0.0, le=0.004)] = 0.001
-    selection_window: Annotated[float, Field(ge=0.02, le=MAX_SELECTION_WINDOW)] | None = None
-    latency: Annotated[float, Field(gt=0.0)] = 0.1
-    reselect_after: Annotated[int, Field(ge=1, le=9)] | None = None
-    pssch_rsrp_threshold_dbm: Annotated[float, Field(ge=-128.0, le=-2.0)] = -128.0
-    cbr_threshold_dbm: Annotated[float, Field(ge=-112.0, le=-22.0)] = -94.0
-    pscch_errors: str = "pscch"
-
-    @model_validator(mode="after")
-    def _standard(self) -> SidelinkSettings:
-        if self.interval not in INTERVALS:
-            raise ValueError(
-                f"interval is not supported (got {self.interval:g} s; "
-                f"expected one of {', '.join(f'{interval:g}' for interval in INTERVALS)})"
-            )
-        if self.pscch_errors not in CURVES:
-            raise ValueError(
-                f"unknown packet error curve {self.pscch_errors!r}; {suggestion(self.pscch_errors, CURVES)}"
-            )
-        return self
-
-    @property
-    def interval_subframes(self) -> int:
-        """Resource reservation interval in subframes."""
-        return round(self.interval / SUBFRAME)
-
-    @property
-    def window_subframes(self) -> int:
-        """T2 in subframes."""
-        window = min(self.interval, MAX_SELECTION_WINDOW) if self.selection_window is None else self.selection_window
-        return round(window / SUBFRAME)
-
-    @property
-    def counter_range(self) -> tuple[int, int]:
-        """Minimum and maximum reselection counter (3GPP TS 36.321, 5.14.1.1)."""
-        factor = max(1, round(0.1 / self.interval))
-        return 5 * factor, 15 * factor
-
-    @property
-    def control_curve(self) -> ErrorCurve:
-        """Packet error curve of the control channel."""
-        return CURVES[self.pscch_errors]
-
-    def extent(self, size: int) -> tuple[int, int]:
-        """Return the numbers of subchannels and of subframes that a message of `size` bytes occupies."""
-        needed = max(1, math.ceil(size / self.subchannel_bytes))
-        return min(needed, self.subchannels), math.ceil(needed / self.subchannels)
-
-    def pssch_blocks(self, width: int) -> int:
-        """Return the number of resource blocks for the data of a transmission in `width` subchannels.
-
-        3GPP TS 36.213, 14.1.1.4C: largest product of powers of 2, 3 and 5 without the blocks of the control channel.
-        """
-        blocks = max(1, RESOURCE_BLOCKS // self.subchannels * width - PSCCH_BLOCKS)
-        while not _is_regular(blocks):
-            blocks -= 1
-        return blocks
-
-
-def _is_regular(number: int) -> bool:
-    for prime in (2, 3, 5):
-        while number % prime == 0:
-            number //= prime
-    return number == 1
 
 
 class PacketErrors(Settings):
@@ -182,10 +86,10 @@ class Jammer(Settings):
 class RadioProfile(ComposedProfile):
     """Settings of a radio channel; `delay` and `loss` apply in addition to the radio model.
 
-    technology     80211p (carrier sensing) or cv2x_mode4 (semi-persistent scheduling)
+    technology     80211p (carrier sensing), cv2x_mode4 or nr_v2x_mode2 (semi-persistent scheduling)
     frequency_ghz, tx_power_dbm, antenna_gain_dbi   carrier, transmitter, and gain of each of the two antennas
-    noise_dbm      noise in 10 MHz [dBm];  sensing_dbm  minimum sensed power, None: that of the technology (-85 or
-                   -90.5 dBm)
+    noise_dbm      noise in 10 MHz [dBm];  sensing_dbm  minimum sensed power, None: that of the technology (-85,
+                   -90.5 or -130 dBm)
     path_loss      path loss model and its settings
     line_of_sight  `rays` through the world, `random` by the probabilities of TR 37.885, `clear`
     shadowing_db   standard deviation; None: that of the path loss model, 0: no shadowing
@@ -195,6 +99,7 @@ class RadioProfile(ComposedProfile):
     data_rate_mbps data rate of 802.11p;  mtu  maximum frame size [bytes]
     jitter         maximum of the uniform random time from the tick until a message is ready [s]
     sidelink       resource pool and selection of C-V2X Mode 4
+    nr_sidelink    carrier, resource pool and selection of NR-V2X Mode 2
     queue          transmit queue;  congestion  congestion control
     background     background traffic that is not simulated, by one of the analytic models
     jammers        transmitters of noise, with 802.11p
@@ -217,6 +122,7 @@ class RadioProfile(ComposedProfile):
     mtu: PositiveInt = 1400
     jitter: Annotated[float, Field(ge=0.0, le=10.0)] = 0.01
     sidelink: SidelinkSettings = SidelinkSettings()
+    nr_sidelink: NrSidelinkSettings = NrSidelinkSettings()
     queue: QueueSettings = QueueSettings()
     congestion: CongestionControl = NoDcc()
     background: Background | None = None
@@ -231,11 +137,11 @@ class RadioProfile(ComposedProfile):
             raise ValueError(
                 "own_perception has no effect with model radio (a station cannot receive its own messages)"
             )
-        if self.background is not None and self.background.kind != self.technology:
-            raise ValueError(f"background.kind must be {self.technology}, as technology (got {self.background.kind})")
         idle = self.model_fields_set & _IDLE[self.technology]
         if idle:
             raise ValueError(f"{min(idle)} has no effect with technology {self.technology}")
+        if self.background is not None and self.background.kind != self.technology:
+            raise ValueError(f"background.kind must be {self.technology}, as technology (got {self.background.kind})")
         return self
 
     @property
@@ -245,19 +151,26 @@ class RadioProfile(ComposedProfile):
 
     @property
     def noise(self) -> float:
-        """Noise in the band of a message [dBm]; with C-V2X in one subchannel, 10 of 50 resource blocks."""
+        """Noise in the band of a message [dBm]; with a sidelink in one subchannel."""
         return self.noise_in(1)
+
+    @property
+    def pool(self) -> Pool | None:
+        """Resource pool of the technology; None with 802.11p."""
+        if self.technology == "80211p":
+            return None
+        return self.sidelink if self.technology == "cv2x_mode4" else self.nr_sidelink
 
     def noise_in(self, width: int) -> float:
         """Return the noise in the band of a message in `width` subchannels [dBm]."""
-        if self.technology == "80211p":
+        if self.pool is None:
             return self.noise_dbm
-        return self.noise_dbm - 10.0 * float(np.log10(RESOURCE_BLOCKS / self.sidelink.pssch_blocks(width)))
+        return self.noise_dbm - 10.0 * float(np.log10(self.pool.noise_blocks / self.pool.pssch_blocks(width)))
 
     @property
     def max_subchannels(self) -> int:
         """Maximum number of subchannels of a message; 1 with 802.11p."""
-        return 1 if self.technology == "80211p" else self.sidelink.subchannels
+        return 1 if self.pool is None else self.pool.subchannels
 
     @property
     def radiated(self) -> float:
@@ -269,9 +182,11 @@ class RadioProfile(ComposedProfile):
         """Packet error curves with LOS, NLOSv and NLOS.
 
         Those of 802.11p are known for 6 Mbit/s. At another data rate they are shifted by the difference of the minimum
-        sensitivities in the standard.
+        sensitivities in the standard. That of NR-V2X is the one of its modulation and code rate.
         """
         chosen = self.packet_errors
+        if chosen is None and self.technology == "nr_v2x_mode2":
+            return (self.nr_sidelink.data_curve,) * 3
         los, nlosv, nlos = _CURVES[self.technology] if chosen is None else (chosen.los, chosen.nlosv, chosen.nlos)
         by = SENSITIVITIES[self.data_rate_mbps] - SENSITIVITIES[CURVE_RATE_MBPS]
         curves = {name: CURVES[name].shifted(by) if by else CURVES[name] for name in (los, nlosv, nlos)}
@@ -279,9 +194,9 @@ class RadioProfile(ComposedProfile):
 
     def airtime(self, size: int) -> float:
         """Return the duration of the transmission of a message of `size` bytes [s]."""
-        if self.technology == "80211p":
+        if self.pool is None:
             return ieee80211p_airtime(size, self.data_rate_mbps, self.mtu)
-        return SUBFRAME * self.sidelink.extent(size)[1]
+        return self.pool.slot * self.pool.extent(size)[1]
 
     def background_by_loss(self) -> tuple[ErrorTable, Array] | None:
         """Return the error table of the background traffic, and the LOS path loss at each of its distances [dB]."""

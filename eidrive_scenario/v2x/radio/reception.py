@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,9 @@ CAUSES = ("delivered", "half_duplex", "sensing", "busy", "propagation", "jamming
 DELIVERED, HALF_DUPLEX, SENSING, BUSY, PROPAGATION, JAMMING, COLLISION, QUEUE = range(len(CAUSES))
 BACKGROUND = {"half_duplex": HALF_DUPLEX, "busy": BUSY, "collision": COLLISION}
 """Causes added by background traffic. Causes of signal strength are excluded, because the link budget has them."""
+_ALL = slice(None)
+_CERTAIN = 1.0 - 1e-15
+"""Maximum error rate of a part of a message, so that its logarithm is finite."""
 _SALTS = np.arange(1, len(BACKGROUND) + 1, dtype=np.uint64)[:, None, None]
 
 
@@ -75,15 +79,15 @@ class Receiver:
         own = np.array([index_of[id(transmission)] for transmission in ended], dtype=np.int64)
         senders, signal = rows.take(own), received.take(own, axis=0)
         links, states = keys.take(senders, axis=0), budget.states.take(senders, axis=0)
-        numbers = np.array([[transmission.message.number] for transmission in ended])
+        numbers = np.array([[transmission.draw_number] for transmission in ended])
         sizes = np.array([[transmission.message.size] for transmission in ended], dtype=float)
         noise_dbm = np.array([[self._noises_dbm[transmission.bands - 1]] for transmission in ended])
         draws, snr = uniforms(links, numbers), signal - noise_dbm
 
-        def lost_with(disturbance: Array) -> Bools:
-            """Return which messages noise and this power of other transmitters [mW] destroy."""
-            floor = 10.0 * np.log10(10.0 ** (noise_dbm / 10.0) + disturbance)
-            return draws < self._errors(signal - floor, states, sizes)
+        def errors_with(disturbance: Array, parts: Integers | slice = _ALL) -> Array:
+            """Return the packet error rates of these messages with noise and this power of other transmitters [mW]."""
+            floor = 10.0 * np.log10(10.0 ** (noise_dbm[parts] / 10.0) + disturbance)
+            return self._errors(signal[parts] - floor, states[parts], sizes[parts])
 
         losses = [(SENSING, signal < self._sensing_dbm), (PROPAGATION, draws < self._errors(snr, states, sizes))]
         busy = [transmission.busy for transmission in ended if transmission.busy is not None]
@@ -94,12 +98,13 @@ class Receiver:
             control = np.array(controls)
             losses += [(PROPAGATION, control == PROPAGATION), (COLLISION, control == COLLISION)]
         if jamming is not None:
-            losses.append((JAMMING, lost_with(jamming)))
+            losses.append((JAMMING, draws < errors_with(jamming)))
         if _is_any_overlap(active):
             interference, half_duplex = _interference(own, active, rows, received)
             losses.append((HALF_DUPLEX, half_duplex))
             if interference is not None:
-                losses.append((COLLISION, lost_with(interference if jamming is None else interference + jamming)))
+                power_of_others = interference.power if jamming is None else interference.power + jamming
+                losses.append((COLLISION, draws < interference.combine(errors_with(power_of_others, interference.of))))
         if self.background is not None:
             losses += self._background_losses(self.background, budget.mean_loss.take(senders, axis=0), links, numbers)
         causes = np.zeros(snr.shape, dtype=np.int8)
@@ -131,6 +136,33 @@ class Receiver:
         ]
 
 
+@dataclass(frozen=True)
+class Interference:
+    """Power of other transmitters in P parts of those of T messages that overlap with any.
+
+    The parts are between the starts and ends of the others.
+
+    of      (P,) messages, ascending
+    shares  (P,) durations, as shares of the message
+    power   (P, N) sum of the others at each station [mW]
+    """
+
+    count: int
+    of: Integers
+    shares: Array
+    power: Array
+
+    def combine(self, errors: Array) -> Array:
+        """Return the error rates (T, N) of messages whose parts would have `errors` (P, N) over the whole message.
+
+        Errors in the parts are independent: 1 - PER is the product of (1 - PER of the part)^share, as in ns-3.
+        """
+        survival = np.zeros((self.count, errors.shape[1]))
+        np.add.at(survival, self.of, self.shares[:, None] * np.log1p(-np.minimum(errors, _CERTAIN)))
+        combined: Array = -np.expm1(survival)
+        return combined
+
+
 def _is_any_overlap(active: Sequence[Transmission]) -> bool:
     """Return whether any two transmissions overlap; with carrier sensing and few stations, none do."""
     end = -math.inf
@@ -143,8 +175,8 @@ def _is_any_overlap(active: Sequence[Transmission]) -> bool:
 
 def _interference(
     own: Integers, active: Sequence[Transmission], rows: Integers, received: Array
-) -> tuple[Array | None, Bools]:
-    """Return the interference (T, N) [mW], None without any, and whether the receiver transmits (T, N).
+) -> tuple[Interference | None, Bools]:
+    """Return the interference, None without any, and whether the receiver transmits (T, N).
 
     Sums follow the order of the stations, which makes them independent of the BLAS library.
 
@@ -164,15 +196,24 @@ def _interference(
         common = np.minimum(last, last[own, None]) - np.maximum(first, first[own, None])
         same_band, shares = overlapping & (common > 0), common / (last - first)
     half_duplex = np.zeros((len(own), received.shape[1]), dtype=bool)
-    interference = np.zeros(half_duplex.shape) if same_band.any() else None
     milliwatts = 10.0 ** (received / 10.0)
+    parts: list[tuple[int, float, Array]] = []
     for index in np.flatnonzero(overlapping.any(axis=1)).tolist():
         half_duplex[index, rows[overlapping[index]]] = True
         others = np.flatnonzero(same_band[index])
-        if interference is not None and len(others):
-            others = others[np.argsort(rows[others], kind="stable")]
-            disturbing = milliwatts[others]
-            if shares is not None:
-                disturbing = disturbing * shares[index, others][:, None]
-            interference[index] = disturbing.sum(axis=0)
-    return interference, half_duplex
+        if not len(others):
+            continue
+        others = others[np.argsort(rows[others], kind="stable")]
+        disturbing = milliwatts[others]
+        if shares is not None:
+            disturbing = disturbing * shares[index, others][:, None]
+        begin, stop = start[own[index]], end[own[index]]
+        edges = np.unique(np.clip(np.concatenate([[begin, stop], start[others], end[others]]), begin, stop))
+        for since, until in pairwise(edges.tolist()):
+            present = (start[others] < until - TIME_TOLERANCE) & (since < end[others] - TIME_TOLERANCE)
+            if until - since > TIME_TOLERANCE:
+                parts.append((index, (until - since) / (stop - begin), disturbing[present].sum(axis=0)))
+    if not parts:
+        return None, half_duplex
+    of, lengths, power = zip(*parts, strict=True)
+    return Interference(len(own), np.array(of), np.array(lengths), np.array(power)), half_duplex

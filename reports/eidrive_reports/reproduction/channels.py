@@ -52,7 +52,7 @@ def setup(runs: Mapping[tuple[str, str], int], loaded: int) -> tuple[str, ...]:
         f"Load: {loaded} runs per arm of scenario 1 with `conflict_area`, with up to 198 added stations within 200 m "
         "of the crossing that send CAM at 10 Hz. The roadside unit sends at 20 Hz. All lines of sight are clear, so "
         "that losses are caused by medium access. Messages are ready at random times within 50 ms, as stations are not "
-        "synchronized. With C-V2X Mode 4 the reservation interval of 100 ms admits every second message of the "
+        "synchronized. With both sidelinks the reservation interval of 100 ms admits every second message of the "
         "roadside unit; the newer one replaces the older one in the queue.",
     )
 
@@ -139,6 +139,7 @@ STATIONS = (2, 25, 50, 100, 200)
 ACCESS: Mapping[str, Mapping[str, Any]] = {
     "802.11p": {"technology": "80211p"},
     "C-V2X Mode 4": {"technology": "cv2x_mode4", "sidelink": {"interval": 0.1, "subchannels": 4}},
+    "NR-V2X Mode 2": {"technology": "nr_v2x_mode2", "nr_sidelink": {"interval": 0.1}},
 }
 """Medium access of the loaded channel."""
 URBAN = {"model": "radio", "path_loss": {"kind": "tr37885", "environment": "urban"}, "queue": {"discipline": "lcfs"}}

@@ -1,4 +1,4 @@
-"""Stations that transmit by C-V2X Mode 4, and a record of all transmissions."""
+"""Stations that transmit by a sidelink, and a record of all transmissions."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from eidrive_scenario.v2x.radio.channel import RadioChannel
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 MODE_4: dict[str, Any] = {**QUIET, "technology": "cv2x_mode4", "jitter": 0.0}
+MODE_2: dict[str, Any] = {**QUIET, "technology": "nr_v2x_mode2", "jitter": 0.0}
 TWO: dict[str, Place] = {"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}
 
 
@@ -20,10 +21,18 @@ class Air:
     """Stations on one channel with messages of given sizes and rates, and all their transmissions."""
 
     def __init__(
-        self, carrier: RadioChannel, places: Mapping[str, Place], dt: float = 0.05, listeners: int | None = None
+        self,
+        carrier: RadioChannel,
+        places: Mapping[str, Place],
+        dt: float = 0.05,
+        listeners: int | None = None,
+        numbers: int = 1,
     ) -> None:
-        """Limit the receivers to the first `listeners` stations; None: all stations receive."""
-        self.carrier, self.places, self.dt, self.tick = carrier, dict(places), dt, 0
+        """Limit the receivers to the first `listeners` stations; None: all stations receive.
+
+        numbers  distance of the message numbers of two ticks
+        """
+        self.carrier, self.places, self.dt, self.tick, self.numbers = carrier, dict(places), dt, 0, numbers
         self.listeners = list(places)[:listeners]
         self.events: list[LinkEvent] = []
         self.transmissions: list[Transmission] = []
@@ -41,7 +50,10 @@ class Air:
             now = self.tick * self.dt
             self.carrier.update_environment(RadioEnvironment(self.places))
             outbox = [
-                (message(name, self.tick, now, sizes[self.tick % len(sizes)]), [n for n in self.listeners if n != name])
+                (
+                    message(name, self.tick * self.numbers, now, sizes[self.tick % len(sizes)]),
+                    [n for n in self.listeners if n != name],
+                )
                 for name, period in every.items()
                 if name in self.places and self.tick % period == 0
             ]

@@ -26,7 +26,7 @@ def composed(source: str | Path | Mapping[str, object]) -> ComposedProfile:
 def test_build_channel_of_every_library_profile_has_its_model() -> None:
     names = {"none", *(path.stem for path in LIBRARY.glob("*.yaml"))}
     assert {"none", "ideal", "latency_300ms", "error_30pct", "paper_latency_300ms", "paper_error_30pct"} <= names
-    assert {"80211p_urban", "cv2x_highway", "5g_uu", "bursty", "congested"} <= names
+    assert {"80211p_urban", "cv2x_highway", "nr_v2x_highway", "5g_uu", "bursty", "congested"} <= names
     for name in names:
         profile = load_profile(name)
         channel = build_channel(profile, 0)

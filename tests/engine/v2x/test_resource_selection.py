@@ -1,4 +1,4 @@
-"""Sensing-based resource selection (3GPP TS 36.213, 14.1.1.6), with resources counted by hand."""
+"""Sensing-based resource selection of Mode 4 and Mode 2, with resources counted by hand."""
 
 from __future__ import annotations
 
@@ -10,29 +10,47 @@ import pytest
 from numpy.typing import NDArray
 
 from eidrive_scenario.base.randomness import generator
-from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Request, Sensed, candidates
+from eidrive_scenario.v2x.radio.sidelink.resource_selection import PSTEP, WINDOW, Request, Sensed, candidates
 
 NOW, BANDS = 5000, 4
-REQUEST = Request(now=NOW, first=NOW + 1, last=NOW + 100, width=1, length=1, interval=100, uses=100, threshold=-128.0)
+REQUEST = Request(
+    now=NOW,
+    first=NOW + 1,
+    last=NOW + 100,
+    width=1,
+    length=1,
+    interval=100,
+    uses=100,
+    threshold=-128.0,
+    share=0.2,
+    span=PSTEP,
+    ranks=True,
+)
 """100 subframes of 4 subchannels: 400 candidate resources, of which 80 are reported."""
 
 
 def sensed(
-    *, rssi: dict[tuple[int, int], float] | None = None, own: tuple[int, ...] = (), sci: Any = (), bands: int = BANDS
+    *,
+    rssi: dict[tuple[int, int], float] | None = None,
+    own: tuple[int, ...] = (),
+    sci: Any = (),
+    ahead: int = 0,
+    bands: int = BANDS,
 ) -> Sensed:
     """Return sensing results from S-RSSI by (subframe, subchannel), own subframes and decoded SCI.
 
-    sci  rows of (subframe, subchannel, width, RSRP)
+    sci    rows of (subframe, subchannel, width, RSRP)
+    ahead  subframes from each SCI to a later transmission of its message; 0: it reserves for the next message
     """
     power, monitored = np.zeros((WINDOW, bands), dtype=np.float32), np.ones(WINDOW, dtype=np.bool_)
     for (subframe, band), value in (rssi or {}).items():
         power[subframe % WINDOW, band] = value
     monitored[np.array(own, dtype=np.int64) % WINDOW] = False
     columns = np.array(sci, dtype=float).reshape(-1, 4)
-    reserved, first, widths = (columns[:, place].astype(np.int64) for place in range(3))
-    return Sensed(
-        power, monitored, np.array(own, dtype=np.int64), reserved, first, widths, columns[:, 3].astype(np.float32)
-    )
+    decoded, first, widths = (columns[:, place].astype(np.int64) for place in range(3))
+    unheard = np.array(own, dtype=np.int64)
+    rsrp = columns[:, 3].astype(np.float32)
+    return Sensed(power, monitored, unheard, decoded, np.full_like(decoded, ahead), first, widths, rsrp)
 
 
 def reported(request: Request, history: Sensed, seed: int = 1) -> set[tuple[int, int]]:
@@ -135,3 +153,42 @@ def test_candidates_of_larger_messages_are_contiguous(width: int, length: int, c
 def test_candidates_without_monitored_subframes_are_not_empty() -> None:
     """A station that transmitted in each subframe of the interval still selects a resource."""
     assert len(reported(REQUEST, sensed(own=tuple(range(4900, 5000))))) == 80
+
+
+MODE_2 = replace(REQUEST, ranks=False, span=100)
+
+
+def test_mode_2_reports_all_resources_that_are_not_reserved() -> None:
+    """3GPP TS 38.214, 8.1.4: no ranking by power. SCI in 4950 reserves subchannels 1 and 2 of 5050."""
+    loud = {(5001 + y - 100 * j, 3): 1.0 for y in range(100) for j in range(1, 11)}
+    everything = {(5001 + y, x) for y in range(100) for x in range(4)}
+    assert reported(MODE_2, sensed(rssi=loud)) == everything
+    assert reported(MODE_2, sensed(sci=[(4950, 1, 2, -100.0)])) == everything - {(5050, 1), (5050, 2)}
+
+
+def test_mode_2_excludes_later_transmissions_of_a_message_once() -> None:
+    """SCI in 4990 announces a transmission in 5010; with a window of 20 ms it would repeat in 5030."""
+    request = replace(MODE_2, last=NOW + 60, interval=20, span=60)
+    everything = {(5001 + y, x) for y in range(60) for x in range(4)}
+    announced = sensed(sci=[(4990, 2, 1, -90.0)], ahead=20)
+    assert everything - reported(request, announced) == {(5010, 2)}
+    assert reported(request, sensed(sci=[(4990, 2, 1, -90.0)], ahead=5)) == everything, "the slot has passed"
+
+
+@pytest.mark.parametrize(("share", "last"), [(0.2, 5021), (0.35, 5039), (0.5, 5051)])
+def test_mode_2_raises_the_threshold_until_the_share_remains(share: float, last: int) -> None:
+    """Slot y is reserved at -120 + 0.5 (y - 5001) dBm: thresholds of -110, -101 and -95 dBm leave the share."""
+    sci = [(4901 + y, 0, 4, -120.0 + 0.5 * y) for y in range(100)]
+    left = reported(replace(MODE_2, share=share), sensed(sci=sci))
+    assert {slot for slot, _ in left} == set(range(5001, last + 1))
+
+
+def test_mode_2_uses_unmonitored_slots_if_too_few_were_monitored() -> None:
+    """Step 5a: own transmissions do not exclude if less than the share would remain; reservations still do."""
+    own = tuple(range(4900, 4990))
+    assert {slot for slot, _ in reported(MODE_2, sensed(own=own))} == set(range(5001, 5101))
+    left = reported(MODE_2, sensed(own=own, sci=[(4950, 1, 1, -90.0)]))
+    assert {(5001 + y, x) for y in range(100) for x in range(4)} - left == {(5050, 1)}
+    assert {slot for slot, _ in reported(MODE_2, sensed(own=own[:70]))} == set(range(5001, 5101)) - set(
+        range(5001, 5070)
+    )

@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from radio_traffic import message, radio
-from sidelink_traffic import MODE_4, TWO, Air, many
+from sidelink_traffic import MODE_2, MODE_4, TWO, Air, many
 
-from eidrive_scenario.v2x.radio.profile import SidelinkSettings
+from eidrive_scenario.v2x.radio.resource_pool import SidelinkSettings
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 
@@ -123,12 +123,14 @@ def test_resource_is_released_after_the_set_number_of_unused_opportunities(limit
     assert ((second.start - first.start) == pytest.approx(0.4)) is kept
 
 
-def test_resources_are_independent_of_the_time_step() -> None:
+@pytest.mark.parametrize("sidelink", [MODE_4, {**MODE_2, "nr_sidelink": {"transmissions": 2}}], ids=["4", "2"])
+def test_resources_are_independent_of_the_time_step(sidelink: dict[str, object]) -> None:
     """Stationary stations with ten messages per second, with time steps of 10 to 100 ms."""
     found = []
     for dt in (0.01, 0.02, 0.05, 0.1):
         places = many(20)
-        air = Air(radio(4, **MODE_4), places, dt).run(4.0, dict.fromkeys(places, round(0.1 / dt)))
+        air = Air(radio(4, **sidelink), places, dt, numbers=round(dt / 0.01))
+        air.run(4.0, dict.fromkeys(places, round(0.1 / dt)))
         found.append(
             {(e.message.sender, round(1000 * e.start), e.first_band) for e in air.transmissions if e.start < 3.8}
         )

@@ -1,4 +1,4 @@
-"""C-V2X Mode 4: collisions, half-duplex operation, control channel, and link statistics."""
+"""Sidelinks: collisions, half-duplex operation, control channel, and link statistics."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections import Counter
 
 import pytest
 from radio_traffic import DT, message, radio
-from sidelink_traffic import MODE_4, Air, many
+from sidelink_traffic import MODE_2, MODE_4, Air, many
 
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
@@ -47,9 +47,10 @@ def test_message_without_decoded_control_information_is_lost() -> None:
     assert {e.reason for e in weak.events} <= {"", "propagation", "sensing"}
 
 
-def test_link_statistics_with_entering_and_leaving_stations_are_complete() -> None:
+@pytest.mark.parametrize("sidelink", [MODE_4, {**MODE_2, "nr_sidelink": {"transmissions": 3}}], ids=["4", "2"])
+def test_link_statistics_with_entering_and_leaving_stations_are_complete(sidelink: dict[str, object]) -> None:
     """A station enters or leaves every fourth tick; every message is counted."""
-    carrier = radio(2, **MODE_4, queue={"discipline": "lcfs"})
+    carrier = radio(2, **sidelink, queue={"discipline": "lcfs"})
     all_places = many(12, 20.0)
     events: list[LinkEvent] = []
     sent = 0

@@ -1,1 +1,1 @@
-"""C-V2X sidelink Mode 4: sensing, resource selection, reception."""
+"""Sidelinks of C-V2X Mode 4 and NR-V2X Mode 2: sensing, resource selection, medium access."""

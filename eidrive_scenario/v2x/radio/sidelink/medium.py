@@ -1,6 +1,6 @@
-"""Medium access of C-V2X Mode 4: sensing-based semi-persistent scheduling.
+"""Medium access of C-V2X Mode 4 and NR-V2X Mode 2: sensing-based semi-persistent scheduling.
 
-Source: 3GPP TS 36.213, 14.1.1.6, and TS 36.321, 5.14.1.1.
+Sources: 3GPP TS 36.213, 14.1.1.6, and TS 36.321, 5.14.1.1; TS 38.214, 8.1.4, and TS 38.321, 5.22.1.1.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,30 +17,31 @@ from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform, uniforms
 from eidrive_scenario.v2x.radio.access import MediumAccess, QueueSettings, Transmission, reorder_fields
 from eidrive_scenario.v2x.radio.congestion import DccGate
-from eidrive_scenario.v2x.radio.profile import SidelinkSettings
+from eidrive_scenario.v2x.radio.nr_physical_layer import SUBCARRIERS
 from eidrive_scenario.v2x.radio.reception import DELIVERED, PROPAGATION
-from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Request, candidates
+from eidrive_scenario.v2x.radio.resource_pool import Pool
+from eidrive_scenario.v2x.radio.sidelink.resource_selection import PSTEP, WINDOW, Request, candidates
 from eidrive_scenario.v2x.radio.sidelink.sensing import Pdus, SensingHistory, decode_control
-from eidrive_scenario.v2x.standards import RESOURCE_BLOCKS, SUBFRAME
 
-SUBCARRIERS = 12
-"""Number of subcarriers of one resource block."""
 ATTEMPTS_PER_COUNT = 10
 """C_resel is ten times the reselection counter (3GPP TS 36.213, 14.1.1.4B)."""
 UNUSED = 1.0
 """Maximum time for which an unused resource stays reserved [s] (3GPP TS 36.321, 5.14.1.1)."""
+COPIES_WITHIN = 32
+"""Slots in which control information can reserve the transmissions of a message (3GPP TS 38.214, 8.1.5)."""
 
 
 @dataclass
 class Grant:
-    """Resource reserved by a station: first used in `subframe`, then once per interval.
+    """Resources reserved by a station: first used in `slot`, then once per interval.
 
-    counter   remaining transmissions (SL_RESOURCE_RESELECTION_COUNTER)
-    used      subframe of the last transmission on it; None before the first
+    places    slots from the first, and first subchannel, of each transmission of a message
+    counter   remaining messages (SL_RESOURCE_RESELECTION_COUNTER)
+    used      slot of the first transmission of the last message on it; None before
     """
 
-    subframe: int
-    band: int
+    slot: int
+    places: Sequence[tuple[int, int]]
     width: int
     length: int
     counter: int
@@ -49,20 +50,20 @@ class Grant:
 
 @dataclass
 class Sending:
-    """A transmission from `subframe`, the first that has not been sensed yet, to `end`, exclusive."""
+    """A transmission from `slot`, the first that has not been sensed yet, to `end`, exclusive."""
 
     row: int
     transmission: Transmission
-    subframe: int
+    slot: int
     end: int
 
 
 class Sidelink(MediumAccess):
-    """Sidelink of C-V2X Mode 4. Stations are half-duplex: they do not receive in subframes in which they transmit.
+    """Sidelink of C-V2X Mode 4 or NR-V2X Mode 2. Stations do not receive in slots in which they transmit.
 
-    A resource is a subframe of the interval and a range of subchannels. Subframe k lasts from k to k + 1 milliseconds.
-    A station without a resource for its first message selects one when the message may be sent, based on its sensing
-    results of the preceding second.
+    A resource is a slot of the interval, with Mode 4 a subframe, and a range of subchannels. Slot k begins at k times
+    its duration. A station without a resource for its first message selects one when the message may be sent, based on
+    its sensing results.
 
     noise_dbm  noise in 10 MHz
     """
@@ -73,19 +74,25 @@ class Sidelink(MediumAccess):
         gate: DccGate,
         sensing_dbm: float,
         seed: int,
-        settings: SidelinkSettings,
+        settings: Pool,
         noise_dbm: float,
     ) -> None:
         super().__init__(queue, gate, sensing_dbm)
         self._settings = settings
         self._seed = seed
         noise = 10.0 ** (noise_dbm / 10.0)
-        self._block_noise = noise / RESOURCE_BLOCKS
-        self._busy_above = 10.0 ** (settings.cbr_threshold_dbm / 10.0) - noise / settings.subchannels
-        self._history = SensingHistory(0, settings.subchannels, settings.interval_subframes)
+        self._block_noise = noise / settings.noise_blocks
+        self._busy_above = 10.0 ** (settings.cbr_threshold_dbm / 10.0) - noise / settings.noise_subchannels
+        self._slot = settings.slot
+        self._interval = round(settings.interval / settings.slot)
+        self._window = round(settings.window / settings.slot)
+        """T2 in slots."""
+        self._span = min(self._interval, round(settings.sensing_window / settings.slot))
+        """Slots for which a reservation or an own transmission excludes resources."""
+        self._history = SensingHistory(0, settings.subchannels, self._span)
         self._grants: list[Grant | None] = []
         self._sent: list[deque[range]] = []
-        """Subframes of the recent transmissions of each station."""
+        """Slots of the recent transmissions of each station."""
         self._choices: dict[str, int] = {}
         """Number of drawn reselection counters by station, including the time before a re-entry."""
         self._next_event = np.zeros(0)
@@ -106,7 +113,7 @@ class Sidelink(MediumAccess):
         """Select the resource of the first message of a station, or transmit the message on it."""
         if self._scheduled[row]:
             return self._start(row)
-        self._next_event[row] = self._occasion(row) * SUBFRAME
+        self._next_event[row] = self._occasion(row) * self._slot
         self._scheduled[row] = True
         return None
 
@@ -122,7 +129,7 @@ class Sidelink(MediumAccess):
         return transmission.bands / self._settings.subchannels
 
     def channel_busy_ratio(self, row: int, span: float) -> float:
-        """Return the channel busy ratio of a station: mean over all subchannels of the measured subframes."""
+        """Return the channel busy ratio of a station: mean over all subchannels of the measured slots."""
         measured = span - float(self._unmeasured_time[row] + self._period_unmeasured[row])
         return super().channel_busy_ratio(row, measured) if measured > 0.0 else 0.0
 
@@ -145,97 +152,123 @@ class Sidelink(MediumAccess):
         transmission, grant = self._head[row], self._grants[row]
         assert transmission is not None
         assert grant is not None
-        subframe = round(float(self._next_event[row]) / SUBFRAME)
-        transmission.first_band, transmission.bands = grant.band, grant.width
-        grant.used = subframe
-        grant.counter -= 1
-        if grant.counter == 0 and self._draw("keep", row) < self._settings.resource_keep_probability:
-            grant.counter = self._new_counter(row)
+        slot = round(float(self._next_event[row]) / self._slot)
+        offset, transmission.first_band = grant.places[transmission.copy]
+        transmission.bands = grant.width
+        transmission.later = [(after - offset, band) for after, band in grant.places[transmission.copy + 1 :]]
+        if not transmission.copy:
+            grant.used = slot
+            grant.counter -= 1
+            periodic, keep = self._settings.periodic, self._settings.resource_keep_probability
+            if grant.counter == 0 and periodic and self._draw("keep", row) < keep:
+                grant.counter = self._new_counter(row)
         transmission.reserves = grant.counter > 0
-        length = round(transmission.duration / SUBFRAME)
-        self._sending.append(Sending(row, transmission, subframe, subframe + length))
-        self._sent[row].append(range(subframe, subframe + length))
-        self._begin(row, transmission, subframe * SUBFRAME)
+        length = round(transmission.duration / self._slot)
+        self._sending.append(Sending(row, transmission, slot, slot + length))
+        self._sent[row].append(range(slot, slot + length))
+        self._begin(row, transmission, slot * self._slot)
+        if transmission.later:
+            ready = (slot + transmission.later[0][0]) * self._slot
+            self._waiting[row].appendleft(replace(transmission, copy=transmission.copy + 1, ready=ready))
         self._contend_next(row)
         return transmission
 
     def _occasion(self, row: int) -> int:
-        """Return the subframe of the first message of a station, on its reserved resource or a new one."""
+        """Return the slot of the first message of a station, on its reserved resource or a new one."""
         head, grant = self._head[row], self._grants[row]
         assert head is not None
+        if head.copy:
+            assert grant is not None
+            assert grant.used is not None
+            return grant.used + grant.places[head.copy][0]
         settings, ready = self._settings, float(self.ready[row])
-        now = math.floor(ready / SUBFRAME + 1e-6)
-        free = self._sent[row][-1].stop if self._sent[row] else now
+        now = math.floor(ready / self._slot + 1e-6)
+        free = now
+        if self._sent[row]:  # a message that waited for the one before is processed from the start of its transmission
+            now, free = max(now, self._sent[row][-1].start), self._sent[row][-1].stop
         width, length = settings.extent(head.message.size)
         if grant is not None and grant.counter > 0 and grant.width >= width and grant.length >= length:
             # A message that is delayed by congestion control is processed in the meantime.
             processed = max(ready, head.ready + settings.processing)
-            earliest = max(free, math.ceil(processed / SUBFRAME - 1e-6))
-            occasion = earliest + (grant.subframe - earliest) % settings.interval_subframes
-            in_time = occasion * SUBFRAME <= ready + settings.latency + TIME_TOLERANCE
+            earliest = max(free, math.ceil(processed / self._slot - 1e-6))
+            occasion = earliest + (grant.slot - earliest) % self._interval
+            in_time = occasion * self._slot <= ready + settings.latency + TIME_TOLERANCE
             # A resource that was not used for some time, or for some occasions, is released.
-            interval, limit = settings.interval_subframes, settings.reselect_after
-            used = grant.subframe - interval if grant.used is None else grant.used
-            is_released = (now - used) * SUBFRAME > UNUSED or (
+            interval, limit = self._interval, settings.reselect_after
+            used = grant.slot - interval if grant.used is None else grant.used
+            is_released = (now - used) * self._slot > UNUSED or (
                 limit is not None and (occasion - used) // interval - 1 >= limit
             )
             if in_time and not is_released:
                 return occasion
-        earliest = max(free, math.ceil((ready + settings.processing) / SUBFRAME - 1e-6))
+        earliest = max(free, math.ceil((ready + settings.processing) / self._slot - 1e-6))
         self._grants[row] = grant = self._select(row, now, earliest, width, length)
-        return grant.subframe
+        return grant.slot
 
     def _select(self, row: int, now: int, earliest: int, width: int, length: int) -> Grant:
         """Select a new resource among the candidates after sensing, and draw its reselection counter."""
         settings = self._settings
-        self._sense(now * SUBFRAME)
+        self._sense(now * self._slot)
         counter = self._new_counter(row)
-        sent, oldest = self._sent[row], now - settings.interval_subframes
+        sent, oldest = self._sent[row], now - self._span
         while sent and sent[0].stop <= oldest:
             sent.popleft()
         request = Request(
             now=now,
             first=earliest,
-            last=max(earliest, now + settings.window_subframes),
+            last=max(earliest, now + self._window),
             width=width,
             length=length,
-            interval=settings.interval_subframes,
-            uses=ATTEMPTS_PER_COUNT * counter,
+            interval=self._interval,
+            uses=ATTEMPTS_PER_COUNT * counter if settings.periodic else 1,
             threshold=settings.pssch_rsrp_threshold_dbm,
+            share=settings.candidate_share,
+            span=PSTEP if settings.ranks_candidates else self._window,
+            ranks=settings.ranks_candidates,
         )
-        own = [subframe for spell in sent for subframe in range(max(spell.start, oldest), min(spell.stop, now))]
+        spells = sent if settings.periodic else ()
+        own = [slot for spell in spells for slot in range(max(spell.start, oldest), min(spell.stop, now))]
         first_bands = settings.subchannels - width + 1
         order = uniforms(np.array([self._key("order", row)], dtype=np.uint64), np.arange(request.starts * first_bands))
         reported = candidates(request, self._history.of(row, now, np.array(own, dtype=np.int64)), order)
-        chosen = int(reported[math.floor(self._draw("choice", row) * len(reported))])
-        start, band = divmod(chosen, first_bands)
-        return Grant(earliest + start, band, width, length, counter)
+        chosen = [int(reported[math.floor(self._draw("choice", row) * len(reported))])]
+        starts = reported // first_bands
+        for copy in range(1, settings.transmissions):
+            taken = [resource // first_bands for resource in chosen]
+            apart = np.abs(starts[:, None] - taken).min(axis=1)
+            within = np.maximum(starts, max(taken)) - np.minimum(starts, min(taken)) < COPIES_WITHIN
+            remaining = reported[(apart >= length) & within]
+            if not len(remaining):
+                break
+            chosen.append(int(remaining[math.floor(self._draw(f"copy {copy}", row) * len(remaining))]))
+        first, *_ = places = sorted(divmod(resource, first_bands) for resource in chosen)
+        return Grant(earliest + first[0], [(start - first[0], band) for start, band in places], width, length, counter)
 
     def _new_counter(self, row: int) -> int:
         name = self.names[row]
         self._choices[name] = self._choices.get(name, 0) + 1
-        low, high = self._settings.counter_range
+        low, high = self._settings.counter_range if self._settings.periodic else (1, 1)
         return low + math.floor(self._draw("counter", row) * (high - low + 1))
 
     def _sense(self, until: float) -> None:
-        """Evaluate sensing of the subframes that end by `until` [s]."""
-        ended = math.inf if math.isinf(until) else math.floor((until + TIME_TOLERANCE) / SUBFRAME + 1e-9)
+        """Evaluate sensing of the slots that end by `until` [s]."""
+        ended = math.inf if math.isinf(until) else math.floor((until + TIME_TOLERANCE) / self._slot + 1e-9)
         while self._sending:
-            first = min(sending.subframe for sending in self._sending)
+            first = min(sending.slot for sending in self._sending)
             if first >= ended:
                 return
             self._sense_window(int(min(ended, first + WINDOW)))
 
     def _sense_window(self, ended: int) -> None:
-        """Evaluate sensing of transmissions before subframe `ended`, at most one sensing window."""
+        """Evaluate sensing of transmissions before slot `ended`, at most one sensing window."""
         due = [
-            (subframe, sending.row, sending.transmission)
+            (slot, sending.row, sending.transmission)
             for sending in self._sending
-            for subframe in range(sending.subframe, min(sending.end, ended))
+            for slot in range(sending.slot, min(sending.end, ended))
         ]
         for sending in self._sending:
-            sending.subframe = max(sending.subframe, ended)
-        self._sending = [sending for sending in self._sending if sending.subframe < sending.end]
+            sending.slot = max(sending.slot, ended)
+        self._sending = [sending for sending in self._sending if sending.slot < sending.end]
         pdus = Pdus.of(sorted(due, key=lambda part: part[:2]))
         blocks = np.array([self._settings.pssch_blocks(width) for width in pdus.widths.tolist()])[:, None]
         power = self.power[pdus.rows]
@@ -243,13 +276,13 @@ class Sidelink(MediumAccess):
             if transmission.gain is not None:
                 power[index] += transmission.gain
         milliwatts = 10.0 ** (power / 10.0)
-        self._history.proceed(int(pdus.subframes[-1]) + 1)
+        self._history.proceed(int(pdus.slots[-1]) + 1)
         received = self._history.receive(pdus, milliwatts / pdus.widths[:, None])
         busy, unmeasured = self._history.busy(received, self._busy_above)
-        self._period_busy += SUBFRAME * busy
-        self._period_unmeasured += SUBFRAME * unmeasured
-        curve = self._settings.control_curve
-        codes = decode_control(pdus, milliwatts / blocks, self._block_noise, curve, self._keys)
+        self._period_busy += self._slot * busy
+        self._period_unmeasured += self._slot * unmeasured
+        curve, boost = self._settings.control_curve, self._settings.control_boost
+        codes = decode_control(pdus, milliwatts / blocks, self._block_noise, boost, curve, self._keys)
         for transmission, code in zip(pdus.transmissions, codes, strict=True):
             before = transmission.control
             transmission.control = code if before is None else np.where(before == DELIVERED, code, before)

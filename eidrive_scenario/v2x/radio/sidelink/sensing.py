@@ -1,4 +1,4 @@
-"""Sensing of C-V2X Mode 4: control information, and the measured power of resources."""
+"""Sensing of a sidelink: control information, and the measured power of resources."""
 
 from __future__ import annotations
 
@@ -16,20 +16,17 @@ from eidrive_scenario.v2x.radio.packet_error import ErrorCurve
 from eidrive_scenario.v2x.radio.reception import COLLISION, DELIVERED, PROPAGATION, Codes
 from eidrive_scenario.v2x.radio.sidelink.resource_selection import WINDOW, Sensed
 
-BOOST = 2.0
-"""Power ratio of resource elements of the control channel and of the data: 3 dB (3GPP TS 36.213, 14.2)."""
-
 
 class Pdus(NamedTuple):
-    """Parts (T,) of transmissions in one subframe each, in the order of the subframes.
+    """Parts (T,) of transmissions in one slot each, in the order of the slots.
 
     rows           of the senders
     bands, widths  first subchannel and number of subchannels
-    numbers        of the messages
+    numbers        of the random draws
     """
 
     transmissions: Sequence[Transmission]
-    subframes: Integers
+    slots: Integers
     rows: Integers
     bands: Integers
     widths: Integers
@@ -37,33 +34,36 @@ class Pdus(NamedTuple):
 
     @classmethod
     def of(cls, parts: Sequence[tuple[int, int, Transmission]]) -> Pdus:
-        """Return at least one part, given by subframe, row of the sender and transmission."""
-        subframes, rows, transmissions = zip(*parts, strict=True)
-        columns = [(each.first_band, each.bands, each.message.number) for each in transmissions]
-        return cls(transmissions, np.array(subframes), np.array(rows), *np.array(columns, dtype=np.int64).T)
+        """Return at least one part, given by slot, row of the sender and transmission."""
+        slots, rows, transmissions = zip(*parts, strict=True)
+        columns = [(each.first_band, each.bands, each.draw_number) for each in transmissions]
+        return cls(transmissions, np.array(slots), np.array(rows), *np.array(columns, dtype=np.int64).T)
 
 
-def decode_control(pdus: Pdus, per_block: Array, block_noise: float, curve: ErrorCurve, keys: Keys) -> Codes:
+def decode_control(
+    pdus: Pdus, per_block: Array, block_noise: float, boost: float, curve: ErrorCurve, keys: Keys
+) -> Codes:
     """Return the outcome of the SCI of each PDU at each station (T, N): DELIVERED, PROPAGATION or COLLISION.
 
     The control channel is in the first subchannel of its transmission; other users of this subchannel interfere.
 
     per_block    (T, N) received power of each PDU in one resource block of its data [mW]
     block_noise  noise in one resource block [mW]
+    boost        power ratio of resource elements of the control channel and of the data
     curve        packet error rate by signal-to-interference-and-noise ratio
     keys         (N, N) keys of the links, by sender and receiver
     """
-    subframes, first, last = pdus.subframes, pdus.bands, pdus.bands + pdus.widths
+    slots, first, last = pdus.slots, pdus.bands, pdus.bands + pdus.widths
     draws = uniforms(keys[pdus.rows], pdus.numbers[:, None])
-    signal = BOOST * per_block
+    signal = boost * per_block
     codes = np.full(per_block.shape, DELIVERED, dtype=np.int8)
-    meets = (subframes[:, None] == subframes) & (first <= first[:, None]) & (first[:, None] < last)
+    meets = (slots[:, None] == slots) & (first <= first[:, None]) & (first[:, None] < last)
     np.fill_diagonal(meets, False)
     met = np.flatnonzero(meets.any(axis=1))
     interference = np.zeros((len(met), per_block.shape[1]))
     for index, own in enumerate(met.tolist()):
         others = np.flatnonzero(meets[own])
-        boosted = np.where(first[others] == first[own], BOOST, 1.0)
+        boosted = np.where(first[others] == first[own], boost, 1.0)
         interference[index] = (per_block[others] * boosted[:, None]).sum(axis=0)
     if len(met):
         disturbed = _decibels(signal[met] / (block_noise + interference))
@@ -85,15 +85,15 @@ CAPACITY = 256
 
 @dataclass
 class Reservations:
-    """Decoded control information of the last `span` subframes that reserves resources.
+    """Decoded control information of the last `span` slots that reserves resources.
 
-    resources  (R, 3) subframe, first subchannel and number of subchannels
+    resources  (R, 4) slot, slots to a later transmission or 0, first subchannel and number of subchannels
     rsrp       (R, N) PSSCH-RSRP [dBm]; -inf if not decoded
     """
 
     stations: int
     span: int
-    resources: Integers = field(default_factory=lambda: np.zeros((CAPACITY, 3), dtype=np.int64))
+    resources: Integers = field(default_factory=lambda: np.zeros((CAPACITY, 4), dtype=np.int64))
     begin: int = 0
     end: int = 0
 
@@ -101,7 +101,7 @@ class Reservations:
         self.rsrp = np.full((CAPACITY, self.stations), NOT_DECODED, dtype=np.float32)
 
     def add(self, resources: Integers, rsrp: Array) -> None:
-        """Append entries, in the order of their subframes."""
+        """Append entries, in the order of their slots."""
         count = len(resources)
         if self.end + count > len(self.resources):
             self._grow(count, int(resources[0, 0]))
@@ -109,13 +109,13 @@ class Reservations:
         self.resources[rows], self.rsrp[rows] = resources, rsrp
         self.end += count
 
-    def of(self, row: int, now: int) -> tuple[Integers, Integers, Integers, NDArray[np.float32]]:
-        """Return subframes, bands, widths and PSSCH-RSRP decoded by a station in the span before subframe `now`."""
+    def of(self, row: int, now: int) -> tuple[Integers, Integers, Integers, Integers, NDArray[np.float32]]:
+        """Return the reservations and their PSSCH-RSRP that a station decoded in the span before slot `now`."""
         self._forget(now)
         rsrp = self.rsrp[self.begin : self.end, row]
         decoded = np.flatnonzero(rsrp > NOT_DECODED)
-        subframes, bands, widths = self.resources[decoded + self.begin].T
-        return subframes, bands, widths, rsrp[decoded]
+        slots, ahead, bands, widths = self.resources[decoded + self.begin].T
+        return slots, ahead, bands, widths, rsrp[decoded]
 
     def rearrange(self, rows: Sequence[int | None]) -> None:
         """Keep the columns of these former rows; None: a new station."""
@@ -131,17 +131,18 @@ class Reservations:
         size = len(self.resources)
         while kept + count > size // 2:
             size *= 2
-        resources = np.zeros((size, 3), dtype=np.int64)
+        resources = np.zeros((size, 4), dtype=np.int64)
         rsrp = np.full((size, self.stations), NOT_DECODED, dtype=np.float32)
         resources[:kept], rsrp[:kept] = self.resources[live], self.rsrp[live]
         self.resources, self.rsrp, self.begin, self.end = resources, rsrp, 0, kept
 
 
 class SensingHistory:
-    """Sensing windows of N stations (3GPP TS 36.213, 14.1.1.6, step 2).
+    """Sensing windows of N stations (3GPP TS 36.213, 14.1.1.6, step 2, and TS 38.214, 8.1.4, step 2).
 
-    rssi       (WINDOW, S, N) S-RSSI by subframe mod WINDOW [mW]; 0 while a station transmits
-    monitored  (WINDOW, N) whether a station received in the subframe
+    span       time for which reservations count [slots]
+    rssi       (WINDOW, S, N) S-RSSI by slot mod WINDOW [mW]; 0 while a station transmits
+    monitored  (WINDOW, N) whether a station received in the slot
     """
 
     def __init__(self, stations: int, subchannels: int, span: int) -> None:
@@ -151,7 +152,7 @@ class SensingHistory:
         self._until: int | None = None
 
     def proceed(self, until: int) -> None:
-        """Append empty subframes up to `until`, exclusive."""
+        """Append empty slots up to `until`, exclusive."""
         if self._until is None:
             self._until = until
         gap = min(until - self._until, WINDOW)
@@ -163,39 +164,43 @@ class SensingHistory:
             self._until = until
 
     def receive(self, pdus: Pdus, per_subchannel: Array) -> Integers:
-        """Add transmissions in appended subframes; return these subframes.
+        """Add transmissions in appended slots; return these slots.
 
         per_subchannel  (T, N) received power of each PDU in each of its subchannels [mW]
         """
-        at = pdus.subframes % WINDOW
+        at = pdus.slots % WINDOW
         columns = (column.tolist() for column in (at, pdus.bands, pdus.widths))
         for row, first, width, power in zip(*columns, per_subchannel, strict=True):
             self.rssi[row, first : first + width] += power.astype(np.float32)
         self.rssi[at, :, pdus.rows] = 0.0
         self.monitored[at, pdus.rows] = False
-        return np.unique(pdus.subframes)
+        return np.unique(pdus.slots)
 
-    def busy(self, subframes: Integers, threshold: float) -> tuple[Array, Integers]:
-        """Return the busy time and the unmeasured time of each station over these subframes (N,) [subframes].
+    def busy(self, slots: Integers, threshold: float) -> tuple[Array, Integers]:
+        """Return the busy time and the unmeasured time of each station over these slots (N,) [slots].
 
         The busy time sums the shares of subchannels whose S-RSSI exceeds the threshold [mW]. A station does not
         measure while it transmits.
         """
-        rows = subframes % WINDOW
+        rows = slots % WINDOW
         monitored = self.monitored[rows]
         counts = ((self.rssi[rows] > threshold) & monitored[:, None]).sum(axis=(0, 1))
         return counts / self.rssi.shape[1], len(rows) - monitored.sum(axis=0)
 
     def reserve(self, pdus: Pdus, codes: Codes, rsrp: Array) -> None:
-        """Add the decoded control information of those PDUs that reserve resources."""
-        reserves = np.flatnonzero([transmission.reserves for transmission in pdus.transmissions])
-        if len(reserves):
-            decoded = (codes == DELIVERED) & self.monitored[pdus.subframes % WINDOW]
-            resources = np.stack([pdus.subframes, pdus.bands, pdus.widths], axis=1)
-            self.reservations.add(resources[reserves], np.where(decoded, rsrp, NOT_DECODED)[reserves])
+        """Add the reservations in decoded control information: of later copies, and of the next interval."""
+        reserved = [
+            (index, slot, ahead, band, transmission.bands)
+            for index, (slot, transmission) in enumerate(zip(pdus.slots.tolist(), pdus.transmissions, strict=True))
+            for ahead, band in (*transmission.later, *[(0, transmission.first_band)] * transmission.reserves)
+        ]
+        if reserved:
+            decoded = (codes == DELIVERED) & self.monitored[pdus.slots % WINDOW]
+            indices, *resources = np.array(reserved).T
+            self.reservations.add(np.stack(resources, axis=1), np.where(decoded, rsrp, NOT_DECODED)[indices])
 
     def of(self, row: int, now: int, own: Integers) -> Sensed:
-        """Return the sensing results of a station before subframe `now`; it transmitted in the subframes `own`."""
+        """Return the sensing results of a station before slot `now`; it transmitted in the slots `own`."""
         self.proceed(now)
         return Sensed(self.rssi[:, :, row], self.monitored[:, row], own, *self.reservations.of(row, now))
 
