@@ -89,22 +89,33 @@ def test_existence_after_missed_detection_equals_that_of_the_tracker(report: Mak
     assert found[0] == pytest.approx(float(missed(np.array(0.9 * np.exp(-0.1 / LIFETIME)))), rel=1e-6)
 
 
-@pytest.mark.parametrize("velocity_deviation", [None, 1.5])
-def test_existence_after_second_detection_equals_hand_calculation(
-    velocity_deviation: float | None, report: Make, fuse: Fuse
-) -> None:
-    """r L / (1 - r + r L) with r = 0.8 exp(-0.01), L = 0.1 + 4 / (0.01 · 2 pi S), S = 0.08 + 0.01 V + 0.002 m², and
-    V = 1.5² of a measured velocity, or 12² m²/s² without one."""
-    velocity = (10.0, 0.0) if velocity_deviation else (np.nan, np.nan)
-    positions = (0.0, 1.0) if velocity_deviation else (0.0, 0.0)
-    reports = [
-        report("A", time, [(x, 0.0)], velocity=velocity, velocity_deviation=velocity_deviation, score=0.8)
-        for time, x in zip((0.0, 0.1), positions, strict=True)
-    ]
-    spread = 0.082 + 0.01 * (velocity_deviation or 12.0) ** 2
-    before, ratio = 0.8 * np.exp(-0.01), 0.1 + 4.0 / (0.01 * 2.0 * np.pi * spread)
+def test_existence_after_second_detection_equals_hand_calculation(report: Make, fuse: Fuse) -> None:
+    """r L / (1 - r + r L) with r = 0.8 exp(-0.01), L = 0.1 + 4 / (0.01 · 2 pi S), S = 0.082 + 0.01 · 12² m²."""
+    reports = [report("A", time, [(0.0, 0.0)], velocity=(np.nan, np.nan), score=0.8) for time in (0.0, 0.1)]
+    before, ratio = 0.8 * np.exp(-0.01), 0.1 + 4.0 / (0.01 * 2.0 * np.pi * (0.082 + 0.01 * 12.0**2))
     expected = before * ratio / (1.0 - before + before * ratio)
     assert fuse(reports, 0.1).existence[0] == pytest.approx(expected, abs=1e-9)
+
+
+def test_existence_by_a_detector_of_velocities_is_its_last_score(report: Make) -> None:
+    """It compares scans, which its reports share: they are not independent. One missed detection does not hide it."""
+    fusion, fused = CovarianceIntersectionFusion(ALL), []
+    for number, score in enumerate((0.8, 0.8, 0.7, None, None, None)):
+        objects = [] if score is None else [(float(number), 0.0)]
+        held = report(
+            "A",
+            0.1 * number,
+            objects,
+            velocity=(10.0, 0.0),
+            velocity_deviation=1.5,
+            score=0.0 if score is None else score,
+        )
+        fusion.add_report(held)
+        fused.append(float(fusion.fuse([held], 0.1 * number).existence[0]))
+    assert fused[:3] == pytest.approx([0.8, 0.8, 0.7])
+    survived = np.exp(-0.1 / LIFETIME)
+    assert fused[3] == pytest.approx(0.7 * float(missed(np.array(survived))) / survived, abs=1e-3)
+    assert fused[3] > 0.5 > fused[5]
 
 
 def test_average_without_existence_returns_none(report: Make) -> None:
