@@ -137,7 +137,9 @@ class RadioProfile(ComposedProfile):
             raise ValueError(
                 "own_perception has no effect with model radio (a station cannot receive its own messages)"
             )
-        idle = self.model_fields_set & _IDLE[self.technology]
+        defaults = {name: type(self).model_fields[name].default for name in _IDLE[self.technology]}
+        # resolved settings, of which sweeps change some, contain the default values
+        idle = [name for name, default in defaults.items() if getattr(self, name) != default]
         if idle:
             raise ValueError(f"{min(idle)} has no effect with technology {self.technology}")
         if self.background is not None and self.background.kind != self.technology:

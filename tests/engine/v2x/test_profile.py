@@ -41,6 +41,17 @@ def test_build_channel_of_every_library_profile_has_its_model() -> None:
             assert channel.own_perception == name.startswith("paper")
 
 
+def test_resolved_settings_of_every_library_profile_are_a_profile() -> None:
+    """A sweep over settings of the channel changes the resolved settings."""
+    for path in LIBRARY.glob("*.yaml"):
+        profile = load_profile(path.stem)
+        assert profile is not None
+        resolved = profile.model_dump(mode="json", exclude={"name", "description"})
+        again = load_profile(resolved)
+        assert again is not None
+        assert again.model_dump(mode="json", exclude={"name", "description"}) == resolved
+
+
 @pytest.mark.parametrize("setting", ["mean: 1.0e-300, sd: 0.1", "mean: 0.1, sd: 1.0e+300"])
 def test_lognormal_delay_with_overflowing_ratio_raises(setting: str) -> None:
     with pytest.raises(SettingError, match="delay"):
