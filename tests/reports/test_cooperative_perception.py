@@ -328,3 +328,16 @@ def test_features_need_the_bytes_of_their_frames_beside_those_of_boxes(learned_t
         assert volume(arm) - boxes == pytest.approx(3 * 16 * size / 1.5e6, rel=0.05)
     assert volume("features only, 1 %") == pytest.approx(3 * 16 * (1_640 + 2 * 62) / 1.5e6, rel=0.05)
     assert volume("where2comm", loss=0.5) == pytest.approx(volume("where2comm")), "lost frames are transmitted, too"
+
+
+@pytest.mark.exhaustive
+def test_filtering_all_scans_keeps_the_order_of_scores() -> None:
+    """Late fusion of the network's detections gains 0.26 in AP 0.7 over none (learned.md: 0.25 over all scenes).
+
+    With existence that accumulates over its scans, wrong boxes that persist are as likely as right ones: 0.15.
+    """
+    arms = [Condition("none"), Condition("covariance_intersection")]
+    settings = RunSettings(detector="pillars", time_limit=8.0)
+    record = run_trial("coop/scenario_4", 1, settings, "Ego", arms)[1].record()
+    alone, fused = (Pool([record], arm.name, 2).precision(2).value for arm in arms)
+    assert fused > alone + 0.2

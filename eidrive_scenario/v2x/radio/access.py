@@ -49,7 +49,7 @@ class Transmission:
     """Number of subchannels, from `first_band` on."""
     reserves: bool = False
     """Whether the control information reserves the resource for the next message."""
-    copy: int = 0
+    retransmission: int = 0
     """Number of earlier transmissions of the same message."""
     later: Sequence[tuple[int, int]] = ()
     """Slots from here to each later transmission of the message, and its first subchannel."""
@@ -65,7 +65,7 @@ class Transmission:
     @property
     def draw_number(self) -> int:
         """Number of the random draws of this transmission; that of the message for the first."""
-        return self.message.number + (self.copy << 40)
+        return self.message.number + (self.retransmission << 40)
 
     @property
     def undecided(self) -> Sequence[str]:
@@ -236,7 +236,10 @@ class MediumAccess(ABC):
         self.contending += bool(queue) - (self._head[row] is not None)
         self._head[row] = first = queue[0] if queue else None
         opens = self._last_start[row] + self.interval(row)
-        self.ready[row] = math.inf if first is None else first.ready if first.copy else max(first.ready, opens)
+        if first is None:
+            self.ready[row] = math.inf
+        else:
+            self.ready[row] = first.ready if first.retransmission else max(first.ready, opens)
         self.reset_event(row)
 
     def _begin(self, row: int, transmission: Transmission, start: float) -> None:
@@ -245,8 +248,8 @@ class MediumAccess(ABC):
         if self.fading is not None:
             transmission.gain = self.fading.gain_db(row, transmission.draw_number)
         self._waiting[row].popleft()
-        used = transmission.duration * self.share(transmission)
-        self._last_start[row], self._last_use[row] = start, used + (self._last_use[row] if transmission.copy else 0.0)
+        before = self._last_use[row] if transmission.retransmission else 0.0
+        self._last_start[row], self._last_use[row] = start, before + transmission.duration * self.share(transmission)
         self.active.append(transmission)
 
     def _measure(self, now: float) -> None:
@@ -283,4 +286,6 @@ def reorder_fields(owner: object, rows: Sequence[int | None], **fresh: float) ->
 
 def _is_outdated(transmission: Transmission, *, by: Transmission) -> bool:
     """Return True if another message of the same kind was sent in a later tick, and no transmission has started."""
-    return not transmission.copy and transmission.sent < by.sent and transmission.message.kind == by.message.kind
+    if transmission.retransmission:
+        return False
+    return transmission.sent < by.sent and transmission.message.kind == by.message.kind

@@ -156,6 +156,7 @@ class NrSidelinkSettings(ResourcePool):
     control_boost: ClassVar[float] = 1.0
     ranks_candidates: ClassVar[bool] = False
 
+    interval: Annotated[float, Field(ge=0.001, le=1.0)] = 0.1
     selection_window: Annotated[float, Field(ge=0.001, le=MAX_SELECTION_WINDOW)] | None = None
     bandwidth_mhz: Literal[10, 20, 30, 40] = 10
     subcarrier_spacing_khz: Literal[15, 30, 60] = 15

@@ -92,7 +92,8 @@ def test_transmissions_of_a_message_are_in_different_slots_within_32(count: int)
     air.run(20.0, dict.fromkeys(many(6), 1))
     slots: defaultdict[tuple[str, int], list[int]] = defaultdict(list)
     for entry in air.transmissions:
-        slots[entry.message.sender, entry.message.number].append(round(1000 * entry.start))
+        if entry.message.number < 190:  # the last ones are under way at the end
+            slots[entry.message.sender, entry.message.number].append(round(1000 * entry.start))
     assert {len(each) for each in slots.values()} == {count}
     assert all(later > earlier for each in slots.values() for earlier, later in pairwise(each))
     assert all(each[-1] - each[0] < 32 for each in slots.values())

@@ -27,21 +27,21 @@ ATTEMPTS_PER_COUNT = 10
 """C_resel is ten times the reselection counter (3GPP TS 36.213, 14.1.1.4B)."""
 UNUSED = 1.0
 """Maximum time for which an unused resource stays reserved [s] (3GPP TS 36.321, 5.14.1.1)."""
-COPIES_WITHIN = 32
-"""Slots in which control information can reserve the transmissions of a message (3GPP TS 38.214, 8.1.5)."""
+RETRANSMISSIONS_WITHIN = 32
+"""Slots in which control information can reserve all transmissions of a message (3GPP TS 38.214, 8.1.5)."""
 
 
 @dataclass
 class Grant:
     """Resources reserved by a station: first used in `slot`, then once per interval.
 
-    places    slots from the first, and first subchannel, of each transmission of a message
-    counter   remaining messages (SL_RESOURCE_RESELECTION_COUNTER)
-    used      slot of the first transmission of the last message on it; None before
+    resources  slots from the first, and first subchannel, of each transmission of a message
+    counter    remaining messages (SL_RESOURCE_RESELECTION_COUNTER)
+    used       slot of the first transmission of the last message on it; None before
     """
 
     slot: int
-    places: Sequence[tuple[int, int]]
+    resources: Sequence[tuple[int, int]]
     width: int
     length: int
     counter: int
@@ -153,10 +153,12 @@ class Sidelink(MediumAccess):
         assert transmission is not None
         assert grant is not None
         slot = round(float(self._next_event[row]) / self._slot)
-        offset, transmission.first_band = grant.places[transmission.copy]
+        offset, transmission.first_band = grant.resources[transmission.retransmission]
         transmission.bands = grant.width
-        transmission.later = [(after - offset, band) for after, band in grant.places[transmission.copy + 1 :]]
-        if not transmission.copy:
+        transmission.later = [
+            (after - offset, band) for after, band in grant.resources[transmission.retransmission + 1 :]
+        ]
+        if not transmission.retransmission:
             grant.used = slot
             grant.counter -= 1
             periodic, keep = self._settings.periodic, self._settings.resource_keep_probability
@@ -169,7 +171,9 @@ class Sidelink(MediumAccess):
         self._begin(row, transmission, slot * self._slot)
         if transmission.later:
             ready = (slot + transmission.later[0][0]) * self._slot
-            self._waiting[row].appendleft(replace(transmission, copy=transmission.copy + 1, ready=ready))
+            self._waiting[row].appendleft(
+                replace(transmission, retransmission=transmission.retransmission + 1, ready=ready)
+            )
         self._contend_next(row)
         return transmission
 
@@ -177,10 +181,10 @@ class Sidelink(MediumAccess):
         """Return the slot of the first message of a station, on its reserved resource or a new one."""
         head, grant = self._head[row], self._grants[row]
         assert head is not None
-        if head.copy:
+        if head.retransmission:
             assert grant is not None
             assert grant.used is not None
-            return grant.used + grant.places[head.copy][0]
+            return grant.used + grant.resources[head.retransmission][0]
         settings, ready = self._settings, float(self.ready[row])
         now = math.floor(ready / self._slot + 1e-6)
         free = now
@@ -233,16 +237,18 @@ class Sidelink(MediumAccess):
         reported = candidates(request, self._history.of(row, now, np.array(own, dtype=np.int64)), order)
         chosen = [int(reported[math.floor(self._draw("choice", row) * len(reported))])]
         starts = reported // first_bands
-        for copy in range(1, settings.transmissions):
+        for retransmission in range(1, settings.transmissions):
             taken = [resource // first_bands for resource in chosen]
             apart = np.abs(starts[:, None] - taken).min(axis=1)
-            within = np.maximum(starts, max(taken)) - np.minimum(starts, min(taken)) < COPIES_WITHIN
+            within = np.maximum(starts, max(taken)) - np.minimum(starts, min(taken)) < RETRANSMISSIONS_WITHIN
             remaining = reported[(apart >= length) & within]
             if not len(remaining):
                 break
-            chosen.append(int(remaining[math.floor(self._draw(f"copy {copy}", row) * len(remaining))]))
-        first, *_ = places = sorted(divmod(resource, first_bands) for resource in chosen)
-        return Grant(earliest + first[0], [(start - first[0], band) for start, band in places], width, length, counter)
+            chosen.append(
+                int(remaining[math.floor(self._draw(f"retransmission {retransmission}", row) * len(remaining))])
+            )
+        (first, _), *_ = resources = sorted(divmod(resource, first_bands) for resource in chosen)
+        return Grant(earliest + first, [(start - first, band) for start, band in resources], width, length, counter)
 
     def _new_counter(self, row: int) -> int:
         name = self.names[row]

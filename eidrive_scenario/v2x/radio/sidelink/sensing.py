@@ -188,7 +188,7 @@ class SensingHistory:
         return counts / self.rssi.shape[1], len(rows) - monitored.sum(axis=0)
 
     def reserve(self, pdus: Pdus, codes: Codes, rsrp: Array) -> None:
-        """Add the reservations in decoded control information: of later copies, and of the next interval."""
+        """Add the reservations in decoded control information: of retransmissions, and of the next interval."""
         reserved = [
             (index, slot, ahead, band, transmission.bands)
             for index, (slot, transmission) in enumerate(zip(pdus.slots.tolist(), pdus.transmissions, strict=True))
