@@ -165,8 +165,8 @@ def _fuse_objects(tracks: Table, objects: Objects, now: float, gate: float) -> D
     # A detector that measures velocities compares scans, which its reports share: they are not independent. They
     # confirm that an object persists, but it is no more likely than its last score.
     compared = members["measured"] & ~members["judged"]
-    likely = np.where(compared, np.minimum(members["existence"], members["score"]), members["existence"])
-    existence = 1.0 - np.multiply.reduceat(1.0 - likely, starts)
+    limits = np.where(compared, members["score"], 1.0)
+    existence = 1.0 - np.multiply.reduceat(1.0 - np.minimum(members["existence"], limits), starts)
     mean, covariance = _fuse_states(tracks, objects, gate)
     has_velocity = np.logical_or.reduceat(members["moving"], starts)
     velocity = np.where(has_velocity[:, None], mean[:, 1], np.nan)

@@ -45,8 +45,9 @@ class Csma(MediumAccess):
     ) -> None:
         super().__init__(queue, gate, sensing_dbm)
         self._seed = seed
-        self._noise, self._sensed = 10.0 ** (noise_dbm / 10.0), 10.0 ** (sensing_dbm / 10.0)
-        self._decodable = 10.0 ** (decodable_db / 10.0)
+        self._noise, self._decodable = 10.0 ** (noise_dbm / 10.0), 10.0 ** (decodable_db / 10.0)
+        self._lockable = max(sensing_dbm, noise_dbm + decodable_db)
+        """Minimum power to lock to a message without interference [dBm]."""
         self._slots = np.zeros(0)
         """Remaining backoff of the first message of each station [slots]; NaN if it met no busy medium."""
         self._fixed = np.zeros(0)
@@ -112,20 +113,23 @@ class Csma(MediumAccess):
     def receive(self, started: Sequence[Transmission], until: float) -> None:
         """Set `busy` of the started transmissions, which are in order: the stations locked to earlier ones."""
         pending = list(started)
+        on_air = [each for each in self.active if pending and each.start < pending[0].start]
         while pending:
             instant = pending[0].start + TIME_TOLERANCE
             count = bisect_right(pending, instant, key=lambda transmission: transmission.start)
             together, pending = pending[:count], pending[count:]
             busy = self._locked_until > instant
             locked_until = self._locked_until.copy()
-            on_air = [each for each in self.active if each.start <= instant < each.end]
-            received = 10.0 ** (np.array([self._received(each) for each in on_air]) / 10.0)
-            total = self._noise + received.sum(axis=0)
-            for transmission, power in zip(on_air, received, strict=True):
-                if transmission in together:
-                    transmission.busy = busy
-                    locks = ~busy & (power >= self._sensed) & (power >= self._decodable * (total - power))
-                    locked_until[locks] = np.maximum(locked_until[locks], transmission.end)
+            on_air = [*(each for each in on_air if each.end > instant), *together]
+            received = [self._received(each) for each in on_air]
+            total = sum((10.0 ** (power / 10.0) for power in received), self._noise) if len(on_air) > 1 else None
+            for transmission, power in zip(together, received[-count:], strict=True):
+                transmission.busy = busy
+                locks = ~busy & (power >= self._lockable)
+                if total is not None:
+                    signal = 10.0 ** (power / 10.0)
+                    locks &= signal >= self._decodable * (total - signal)
+                locked_until[locks] = np.maximum(locked_until[locks], transmission.end)
             for transmission in together:
                 locked_until[self._rows[transmission.message.sender]] = transmission.end
             self._locked_until = locked_until

@@ -25,7 +25,6 @@ CAUSES = ("delivered", "half_duplex", "sensing", "busy", "propagation", "jamming
 DELIVERED, HALF_DUPLEX, SENSING, BUSY, PROPAGATION, JAMMING, COLLISION, QUEUE = range(len(CAUSES))
 BACKGROUND = {"half_duplex": HALF_DUPLEX, "busy": BUSY, "collision": COLLISION}
 """Causes added by background traffic. Causes of signal strength are excluded, because the link budget has them."""
-_ALL = slice(None)
 _CERTAIN = 1.0 - 1e-15
 """Maximum error rate of a part of a message, so that its logarithm is finite."""
 _SALTS = np.arange(1, len(BACKGROUND) + 1, dtype=np.uint64)[:, None, None]
@@ -84,10 +83,10 @@ class Receiver:
         noise_dbm = np.array([[self._noises_dbm[transmission.bands - 1]] for transmission in ended])
         draws, snr = uniforms(links, numbers), signal - noise_dbm
 
-        def errors_with(disturbance: Array, parts: Integers | slice = _ALL) -> Array:
-            """Return the packet error rates of these messages with noise and this power of other transmitters [mW]."""
-            floor = 10.0 * np.log10(10.0 ** (noise_dbm[parts] / 10.0) + disturbance)
-            return self._errors(signal[parts] - floor, states[parts], sizes[parts])
+        def errors_with(disturbance: Array, of: Integers) -> Array:
+            """Return the packet error rates of messages `of` with noise and this power of other transmitters [mW]."""
+            floor = 10.0 * np.log10(10.0 ** (noise_dbm[of] / 10.0) + disturbance)
+            return self._errors(signal[of] - floor, states[of], sizes[of])
 
         losses = [(SENSING, signal < self._sensing_dbm), (PROPAGATION, draws < self._errors(snr, states, sizes))]
         busy = [transmission.busy for transmission in ended if transmission.busy is not None]
@@ -98,13 +97,13 @@ class Receiver:
             control = np.array(controls)
             losses += [(PROPAGATION, control == PROPAGATION), (COLLISION, control == COLLISION)]
         if jamming is not None:
-            losses.append((JAMMING, draws < errors_with(jamming)))
+            losses.append((JAMMING, draws < errors_with(jamming, np.arange(len(ended)))))
         if _is_any_overlap(active):
             interference, half_duplex = _interference(own, active, rows, received)
             losses.append((HALF_DUPLEX, half_duplex))
             if interference is not None:
-                power_of_others = interference.power if jamming is None else interference.power + jamming
-                losses.append((COLLISION, draws < interference.combine(errors_with(power_of_others, interference.of))))
+                others = interference.power + (0.0 if jamming is None else jamming)
+                losses.append((COLLISION, draws < interference.combine(errors_with(others, interference.of))))
         if self.background is not None:
             losses += self._background_losses(self.background, budget.mean_loss.take(senders, axis=0), links, numbers)
         causes = np.zeros(snr.shape, dtype=np.int8)
@@ -157,9 +156,10 @@ class Interference:
 
         Errors in the parts are independent: 1 - PER is the product of (1 - PER of the part)^share, as in ns-3.
         """
-        survival = np.zeros((self.count, errors.shape[1]))
-        np.add.at(survival, self.of, self.shares[:, None] * np.log1p(-np.minimum(errors, _CERTAIN)))
-        combined: Array = -np.expm1(survival)
+        combined = np.zeros((self.count, errors.shape[1]))
+        starts = np.flatnonzero(np.diff(self.of, prepend=-1))
+        survival = np.add.reduceat(self.shares[:, None] * np.log1p(-np.minimum(errors, _CERTAIN)), starts)
+        combined[self.of[starts]] = -np.expm1(survival)
         return combined
 
 
@@ -184,8 +184,8 @@ def _interference(
     rows      (A,) rows of the senders of `active`
     received  (A, N) received power of each transmission at each station [dBm]
     """
-    start = np.array([transmission.start for transmission in active])
-    end = np.array([transmission.end for transmission in active])
+    starts, ends = [transmission.start for transmission in active], [transmission.end for transmission in active]
+    start, end = np.array(starts), np.array(ends)
     overlapping = (start < end[own, None] - TIME_TOLERANCE) & (start[own, None] < end - TIME_TOLERANCE)
     overlapping[np.arange(len(own)), own] = False
     same_band, shares = overlapping, None
@@ -207,12 +207,15 @@ def _interference(
         disturbing = milliwatts[others]
         if shares is not None:
             disturbing = disturbing * shares[index, others][:, None]
-        begin, stop = start[own[index]], end[own[index]]
-        edges = np.unique(np.clip(np.concatenate([[begin, stop], start[others], end[others]]), begin, stop))
-        for since, until in pairwise(edges.tolist()):
-            present = (start[others] < until - TIME_TOLERANCE) & (since < end[others] - TIME_TOLERANCE)
+        begin, stop = starts[own[index]], ends[own[index]]
+        times = {time for other in others for time in (starts[other], ends[other]) if begin < time < stop}
+        for since, until in pairwise([begin, *sorted(times), stop]):
             if until - since > TIME_TOLERANCE:
-                parts.append((index, (until - since) / (stop - begin), disturbing[present].sum(axis=0)))
+                present = disturbing
+                if times:
+                    begun, goes_on = start[others] < until - TIME_TOLERANCE, since < end[others] - TIME_TOLERANCE
+                    present = disturbing[begun & goes_on]
+                parts.append((index, (until - since) / (stop - begin), present.sum(axis=0)))
     if not parts:
         return None, half_duplex
     of, lengths, power = zip(*parts, strict=True)

@@ -78,14 +78,6 @@ def test_aperiodic_messages_select_a_new_resource_each() -> None:
     assert max(offsets.values()) < 10
 
 
-def test_all_candidates_are_equally_likely_without_ranking_by_power() -> None:
-    """Mode 2 selects among all resources that no reservation excludes; Mode 4 among the quietest fifth."""
-    air = Air(radio(3, **MODE_2, nr_sidelink={"periodic": False}), TWO, 0.1).run(400.0, {"A": 1})
-    used = Counter((round(1000 * entry.start) % 100, entry.first_band) for entry in air.of("A"))
-    assert len({slot for slot, _ in used}) >= 99
-    assert {band for _, band in used} == set(range(4))
-
-
 @pytest.mark.parametrize("count", [2, 3])
 def test_transmissions_of_a_message_are_in_different_slots_within_32(count: int) -> None:
     air = Air(radio(3, **MODE_2, nr_sidelink={"transmissions": count}), many(6), 0.1)

@@ -24,7 +24,6 @@ REQUEST = Request(
     threshold=-128.0,
     share=0.2,
     span=PSTEP,
-    ranks=True,
 )
 """100 subframes of 4 subchannels: 400 candidate resources, of which 80 are reported."""
 
@@ -53,11 +52,20 @@ def sensed(
     return Sensed(power, monitored, unheard, decoded, np.full_like(decoded, ahead), first, widths, rsrp)
 
 
-def reported(request: Request, history: Sensed, seed: int = 1) -> set[tuple[int, int]]:
+def as_pairs(request: Request, history: Sensed, order: NDArray[np.float64] | None) -> set[tuple[int, int]]:
     """Return the reported resources as (subframe, first subchannel)."""
     places = history.rssi.shape[1] - request.width + 1
-    order: NDArray[np.float64] = generator(seed, "order").random(request.starts * places)
     return {(request.first + index // places, index % places) for index in candidates(request, history, order).tolist()}
+
+
+def reported(request: Request, history: Sensed, seed: int = 1) -> set[tuple[int, int]]:
+    """Return the resources that Mode 4 reports."""
+    count = request.starts * (history.rssi.shape[1] - request.width + 1)
+    return as_pairs(request, history, generator(seed, "order").random(count))
+
+
+def reported_in_mode_2(request: Request, history: Sensed) -> set[tuple[int, int]]:
+    return as_pairs(request, history, None)
 
 
 def reported_for_any_order(request: Request, history: Sensed) -> set[tuple[int, int]]:
@@ -155,40 +163,35 @@ def test_candidates_without_monitored_subframes_are_not_empty() -> None:
     assert len(reported(REQUEST, sensed(own=tuple(range(4900, 5000))))) == 80
 
 
-MODE_2 = replace(REQUEST, ranks=False, span=100)
-
-
 def test_mode_2_reports_all_resources_that_are_not_reserved() -> None:
     """3GPP TS 38.214, 8.1.4: no ranking by power. SCI in 4950 reserves subchannels 1 and 2 of 5050."""
     loud = {(5001 + y - 100 * j, 3): 1.0 for y in range(100) for j in range(1, 11)}
     everything = {(5001 + y, x) for y in range(100) for x in range(4)}
-    assert reported(MODE_2, sensed(rssi=loud)) == everything
-    assert reported(MODE_2, sensed(sci=[(4950, 1, 2, -100.0)])) == everything - {(5050, 1), (5050, 2)}
+    assert reported_in_mode_2(REQUEST, sensed(rssi=loud)) == everything
+    assert reported_in_mode_2(REQUEST, sensed(sci=[(4950, 1, 2, -100.0)])) == everything - {(5050, 1), (5050, 2)}
 
 
 def test_mode_2_excludes_later_transmissions_of_a_message_once() -> None:
     """SCI in 4990 announces a transmission in 5010; with a window of 20 ms it would repeat in 5030."""
-    request = replace(MODE_2, last=NOW + 60, interval=20, span=60)
+    request = replace(REQUEST, last=NOW + 60, interval=20, span=60)
     everything = {(5001 + y, x) for y in range(60) for x in range(4)}
     announced = sensed(sci=[(4990, 2, 1, -90.0)], ahead=20)
-    assert everything - reported(request, announced) == {(5010, 2)}
-    assert reported(request, sensed(sci=[(4990, 2, 1, -90.0)], ahead=5)) == everything, "the slot has passed"
+    assert everything - reported_in_mode_2(request, announced) == {(5010, 2)}
+    assert reported_in_mode_2(request, sensed(sci=[(4990, 2, 1, -90.0)], ahead=5)) == everything, "the slot has passed"
 
 
 @pytest.mark.parametrize(("share", "last"), [(0.2, 5021), (0.35, 5039), (0.5, 5051)])
 def test_mode_2_raises_the_threshold_until_the_share_remains(share: float, last: int) -> None:
     """Slot y is reserved at -120 + 0.5 (y - 5001) dBm: thresholds of -110, -101 and -95 dBm leave the share."""
     sci = [(4901 + y, 0, 4, -120.0 + 0.5 * y) for y in range(100)]
-    left = reported(replace(MODE_2, share=share), sensed(sci=sci))
+    left = reported_in_mode_2(replace(REQUEST, share=share), sensed(sci=sci))
     assert {slot for slot, _ in left} == set(range(5001, last + 1))
 
 
 def test_mode_2_uses_unmonitored_slots_if_too_few_were_monitored() -> None:
     """Step 5a: own transmissions do not exclude if less than the share would remain; reservations still do."""
     own = tuple(range(4900, 4990))
-    assert {slot for slot, _ in reported(MODE_2, sensed(own=own))} == set(range(5001, 5101))
-    left = reported(MODE_2, sensed(own=own, sci=[(4950, 1, 1, -90.0)]))
+    assert {slot for slot, _ in reported_in_mode_2(REQUEST, sensed(own=own))} == set(range(5001, 5101))
+    left = reported_in_mode_2(REQUEST, sensed(own=own, sci=[(4950, 1, 1, -90.0)]))
     assert {(5001 + y, x) for y in range(100) for x in range(4)} - left == {(5050, 1)}
-    assert {slot for slot, _ in reported(MODE_2, sensed(own=own[:70]))} == set(range(5001, 5101)) - set(
-        range(5001, 5070)
-    )
+    assert {slot for slot, _ in reported_in_mode_2(REQUEST, sensed(own=own[:70]))} == set(range(5070, 5101))

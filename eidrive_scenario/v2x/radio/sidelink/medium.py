@@ -228,12 +228,14 @@ class Sidelink(MediumAccess):
             threshold=settings.pssch_rsrp_threshold_dbm,
             share=settings.candidate_share,
             span=PSTEP if settings.ranks_candidates else self._window,
-            ranks=settings.ranks_candidates,
         )
         spells = sent if settings.periodic else ()
         own = [slot for spell in spells for slot in range(max(spell.start, oldest), min(spell.stop, now))]
         first_bands = settings.subchannels - width + 1
-        order = uniforms(np.array([self._key("order", row)], dtype=np.uint64), np.arange(request.starts * first_bands))
+        order = None
+        if settings.ranks_candidates:
+            count = np.arange(request.starts * first_bands)
+            order = uniforms(np.array([self._key("order", row)], dtype=np.uint64), count)
         reported = candidates(request, self._history.of(row, now, np.array(own, dtype=np.int64)), order)
         chosen = [int(reported[math.floor(self._draw("choice", row) * len(reported))])]
         starts = reported // first_bands

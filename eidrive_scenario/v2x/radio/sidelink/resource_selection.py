@@ -33,7 +33,6 @@ class Request:
     threshold      SL-ThresPSSCH-RSRP [dBm]
     share          minimum share of candidates after exclusion
     span           slots within which a shorter interval counts as several reservations: P_step in Mode 4, T_scal
-    ranks          whether only the candidates with the lowest average S-RSSI are reported (Mode 4)
     """
 
     now: int
@@ -46,7 +45,6 @@ class Request:
     threshold: float
     share: float
     span: int
-    ranks: bool
 
     @property
     def starts(self) -> int:
@@ -75,25 +73,26 @@ class Sensed:
     rsrp: NDArray[np.float32]
 
 
-def candidates(request: Request, sensed: Sensed, order: Array) -> Integers:
+def candidates(request: Request, sensed: Sensed, order: Array | None) -> Integers:
     """Return the resources that are reported to higher layers, as indices of (start slot, first subchannel).
 
-    order  (starts · (S - width + 1),) random numbers that order candidates with the same average S-RSSI
+    order  (starts · (S - width + 1),) random numbers that order candidates of equal average S-RSSI, of which Mode 4
+           reports the lowest; None: all candidates are reported (Mode 2)
     """
     bands = sensed.rssi.shape[1]
     slots = request.starts + request.length - 1
     reserved, blind = np.full((slots, bands), -np.inf), np.full((slots, 1), -np.inf)
     _mark(reserved, request, sensed.decoded, sensed.ahead, sensed.bands, sensed.widths, sensed.rsrp)
-    none = np.zeros_like(sensed.own)
-    _mark(blind, request, sensed.own, none, none, np.ones_like(none), np.inf)
+    zeros = np.zeros_like(sensed.own)
+    _mark(blind, request, sensed.own, zeros, zeros, zeros + 1, np.inf)
     highest = _over(np.maximum(reserved, blind), request).max(axis=(2, 3)).ravel()
     least = math.ceil(request.share * len(highest) - 1e-9)
-    if not request.ranks:
-        if np.isposinf(highest).sum() > len(highest) - least:  # step 5a: too many slots were not monitored
-            highest = _over(reserved, request).max(axis=(2, 3)).ravel()
-        return np.flatnonzero(highest <= _raise_threshold(highest, request.threshold, least))
-    average = _over(_average_rssi(request, sensed, slots), request).mean(axis=(2, 3)).ravel()
+    if order is None and np.isposinf(highest).sum() > len(highest) - least:
+        highest = _over(reserved, request).max(axis=(2, 3)).ravel()  # step 5a: too many slots were not monitored
     selectable = np.flatnonzero(highest <= _raise_threshold(highest, request.threshold, least))
+    if order is None:
+        return selectable
+    average = _over(_average_rssi(request, sensed, slots), request).mean(axis=(2, 3)).ravel()
     best = np.lexsort((order[selectable], average[selectable]))[:least]
     return np.sort(selectable[best])
 

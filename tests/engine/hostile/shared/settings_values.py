@@ -169,6 +169,18 @@ STATIONS: Mapping[str, Mapping[str, Any]] = {
 }
 """Properties of stations that are right, and between them hold every setting with a number."""
 
+POOL: Mapping[str, Any] = {
+    "interval": 0.1,
+    "resource_keep_probability": 0.4,
+    "processing": 0.001,
+    "selection_window": 0.1,
+    "latency": 0.1,
+    "reselect_after": 3,
+    "pssch_rsrp_threshold_dbm": -110.0,
+    "cbr_threshold_dbm": -94.0,
+}
+"""Settings of both kinds of resource pools."""
+
 CHANNELS: Mapping[str, Mapping[str, Any]] = {
     "constant": {"delay": {"kind": "constant", "seconds": 0.1}, "loss": {"kind": "bernoulli", "probability": 0.1}},
     "uniform": {"delay": {"kind": "uniform", "minimum": 0.02, "maximum": 0.1}},
@@ -245,30 +257,16 @@ CHANNELS: Mapping[str, Mapping[str, Any]] = {
         "model": "radio",
         "technology": "cv2x_mode4",
         "sidelink": {
-            "interval": 0.1,
+            **POOL,
             "subchannels": 4,
             "subchannel_bytes": 190,
-            "resource_keep_probability": 0.4,
-            "processing": 0.001,
-            "selection_window": 0.1,
-            "latency": 0.1,
-            "reselect_after": 3,
-            "pssch_rsrp_threshold_dbm": -110.0,
-            "cbr_threshold_dbm": -94.0,
         },
     },
     "nr_v2x": {
         "model": "radio",
         "technology": "nr_v2x_mode2",
         "nr_sidelink": {
-            "interval": 0.1,
-            "resource_keep_probability": 0.4,
-            "processing": 0.001,
-            "selection_window": 0.1,
-            "latency": 0.1,
-            "reselect_after": 3,
-            "pssch_rsrp_threshold_dbm": -110.0,
-            "cbr_threshold_dbm": -94.0,
+            **POOL,
             "mcs": 7,
             "sensing_window": 1.1,
             "candidate_share": 0.35,
