@@ -25,8 +25,6 @@ CAUSES = ("delivered", "half_duplex", "sensing", "busy", "propagation", "jamming
 DELIVERED, HALF_DUPLEX, SENSING, BUSY, PROPAGATION, JAMMING, COLLISION, QUEUE = range(len(CAUSES))
 BACKGROUND = {"half_duplex": HALF_DUPLEX, "busy": BUSY, "collision": COLLISION}
 """Causes added by background traffic. Causes of signal strength are excluded, because the link budget has them."""
-_CERTAIN = 1.0 - 1e-15
-"""Maximum error rate of a part of a message, so that its logarithm is finite."""
 _SALTS = np.arange(1, len(BACKGROUND) + 1, dtype=np.uint64)[:, None, None]
 
 
@@ -158,7 +156,8 @@ class Interference:
         """
         combined = np.zeros((self.count, errors.shape[1]))
         starts = np.flatnonzero(np.diff(self.of, prepend=-1))
-        survival = np.add.reduceat(self.shares[:, None] * np.log1p(-np.minimum(errors, _CERTAIN)), starts)
+        with np.errstate(divide="ignore"):  # the logarithm of a part that is certainly lost is minus infinity
+            survival = np.add.reduceat(self.shares[:, None] * np.log1p(-errors), starts)
         combined[self.of[starts]] = -np.expm1(survival)
         return combined
 

@@ -9,6 +9,7 @@ from radio_traffic import DT, QUIET, exchange, message, radio
 
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.radio.channel import RadioChannel
+from eidrive_scenario.v2x.radio.reception import Interference
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 BUSY = {"kind": "80211p", "density": 0.12, "rate": 25, "size": 500}
@@ -156,3 +157,20 @@ def test_transmission_without_receivers_occupies_the_channel() -> None:
         carrier.update_environment(RadioEnvironment(places))
         assert list(carrier.transmit([(message("A", tick, tick * DT), [])], tick * DT)) == []
     assert carrier.channel_busy_ratio("B") == pytest.approx(0.000448 / DT, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("shares", "errors", "expected"),
+    [
+        ((1.0,), (0.3,), 0.3),
+        ((0.25, 0.75), (0.5, 0.0), 1.0 - 0.5**0.25),
+        ((0.5, 0.5), (0.5, 0.5), 0.5),
+        ((0.01, 0.99), (1.0, 0.0), 1.0),
+    ],
+)
+def test_errors_of_parts_combine_by_their_shares_of_the_message(
+    shares: tuple[float, ...], errors: tuple[float, ...], expected: float
+) -> None:
+    """1 - PER is the product of (1 - PER of the part)^share. A part that is certainly lost destroys the message."""
+    parts = Interference(3, np.full(len(shares), 1), np.array(shares), np.zeros((len(shares), 1)))
+    assert parts.combine(np.array(errors)[:, None])[:, 0] == pytest.approx([0.0, expected, 0.0])
