@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
+from itertools import chain, count, repeat
 from typing import TypeVar
 
 from openscenario_xml import scenario_xml
@@ -34,22 +35,39 @@ def processor_time(work: Callable[[], Result]) -> tuple[Result, float]:
 
 
 @cache
-def _first_unit() -> float:
+def _first_reading() -> float:
     """Return the processor time of a reading, measured once per process after one that loads modules [s]."""
-    return min(processor_time(lambda: load_scenario(_content()))[1] for _ in range(2))
+    return min(_reading() for _ in range(2))
+
+
+def _reading() -> float:
+    return processor_time(lambda: load_scenario(_content()))[1]
 
 
 def within_readings(readings: float, work: Callable[[], Result]) -> Result:
     """Return the result of `work`; fail if it takes more than `readings` times the reading of 10,000 parameters.
 
-    Other processes slow down memory and caches, and not evenly: the least ratio of three attempts counts. Only attempts
-    after the first one need a reading beside them.
+    Only attempts after the first one need a reading beside them.
+    """
+    units = chain([_first_reading], repeat(_reading))
+    return _within(readings, work, (unit() for unit in units), f"the reading of {ELEMENTS} parameters")
+
+
+def within_multiple(multiple: float, work: Callable[[], Result], part: Callable[[], object]) -> Result:
+    """Return the result of `work`; fail if it takes more than `multiple` times its `part`."""
+    return _within(multiple, work, (processor_time(part)[1] for _ in count()), "its part")
+
+
+def _within(bound: float, work: Callable[[], Result], units: Iterator[float], name: str) -> Result:
+    """Compare `work` with a unit measured beside it.
+
+    Other processes slow down memory and caches, and not evenly: the least ratio of three attempts counts.
     """
     ratio = math.inf
-    for attempt in range(ATTEMPTS):
-        unit = processor_time(lambda: load_scenario(_content()))[1] if attempt else _first_unit()
+    for _ in range(ATTEMPTS):
+        unit = next(units)
         result, spent = processor_time(work)
         ratio = min(ratio, spent / unit)
-        if ratio < readings:
+        if ratio < bound:
             return result
-    raise AssertionError(f"the work took {ratio:.3g} times the reading of {ELEMENTS} parameters")
+    raise AssertionError(f"the work took {ratio:.3g} times {name}")
