@@ -14,7 +14,7 @@ from eidrive_scenario.roads.model.location import LaneKey
 from eidrive_scenario.roads.model.map_warnings import MapRule, MapWarning
 from eidrive_scenario.roads.model.road_map import Connection, Junction, Lane, LaneSection, Road, RoadLink
 from eidrive_scenario.roads.routing.graph import LaneWays
-from eidrive_scenario.roads.routing.links import LaneLinks, end_section, side_at
+from eidrive_scenario.roads.routing.links import LaneEnd, LaneLinks, end_section, side_at
 
 JUMP = 0.01
 """Maximum gap between the end of a geometry and the start of the next one [m]; also in s."""
@@ -254,34 +254,47 @@ def _dead_end(road: Road, section: LaneSection, lane: Lane, link: RoadLink | Non
 
 
 def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
-    """Yield warnings of linked lanes of two roads whose ends do not meet. The reference lines need not meet."""
+    """Yield warnings of linked lanes whose ends do not meet. The reference lines of two roads need not meet."""
 
     @cache
-    def cross_section(road_id: str, side: int) -> tuple[float, float, float, float, float]:
-        """Return x, y of an end of the reference line [m], their change per meter of t, and the lane offset [m]."""
+    def cross_section(road_id: str, index: int, side: int) -> tuple[float, float, float, float, float]:
+        """Return x, y of an end of a lane section [m], their change per meter of t, and the lane offset [m]."""
         road = roads[road_id]
-        s = road.length if side > 0 else 0.0
+        section = road.sections[index]
+        s = section.s + section.length if side > 0 else section.s
         x, y, heading, *_ = road.reference.at(s)
         ahead, left, _ = lateral_axis(road.elevation.value_and_slope(s)[1], road.superelevation.value(s))
         sin, cos = math.sin(heading), math.cos(heading)
-        return x, y, ahead * cos - left * sin, ahead * sin + left * cos, road.lane_offset.value(s)
+        # At the end of a section the offset is that before a step
+        offset = road.lane_offset.value(math.nextafter(s, 0.0) if side > 0 else s)
+        return x, y, ahead * cos - left * sin, ahead * sin + left * cos, offset
 
-    for ends in links.between_roads():
+    for ends in links.pairs():
         sections = [roads[end.lane.road].sections[end.lane.section] for end in ends]
         lanes = [section.lanes[end.lane.lane] for section, end in zip(sections, ends, strict=True)]
         if not (lanes[0].drivable and lanes[1].drivable):
             continue
-        points = []
+        points, widths = [], []
         for end, section, lane in zip(ends, sections, lanes, strict=True):
-            x, y, dx, dy, offset = cross_section(end.lane.road, end.side)
-            t = offset + lane.side * lane.center.value(section.length if end.side > 0 else 0.0)
+            x, y, dx, dy, offset = cross_section(end.lane.road, end.lane.section, end.side)
+            ds = section.length if end.side > 0 else 0.0
+            t = offset + lane.side * lane.center.value(ds)
             points.append((x + t * dx, y + t * dy))
+            widths.append(lane.width.value(ds))
         apart = math.dist(*points)
-        if apart > JUMP:
-            names = " and ".join(f"lane {end.lane.lane} of road {end.lane.road!r}" for end in ends)
+        is_split = any(len(list(links.beyond(end.lane, end.side))) > 1 for end in ends)
+        if apart > JUMP + (0.5 * abs(widths[0] - widths[1]) if is_split else 0.0):
+            is_inside = ends[0].lane.road == ends[1].lane.road
+            names = " and ".join(_end_name(roads, end, is_inside=is_inside) for end in ends)
             message = f"{names} are linked but their ends are {apart:.3g} m apart"
             kind, hint = "linked lanes that do not meet", "make their ends meet"
             yield MapWarning(MapRule.GEOMETRY_GAP, kind, message, hint, lanes[0].line)
+
+
+def _end_name(roads: Mapping[str, Road], end: LaneEnd, *, is_inside: bool) -> str:
+    road, index, lane = end.lane
+    name = f"lane {lane} of road {road!r}"
+    return f"{name} (section at s = {roads[road].sections[index].s:g} m)" if is_inside else name
 
 
 def _connection(roads: Mapping[str, Road], junction: Junction, connection: Connection) -> Iterator[MapWarning]:

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from functools import cache
-from itertools import chain, count, repeat
+from itertools import count
 from typing import TypeVar
 
 from openscenario_xml import scenario_xml
@@ -44,13 +44,16 @@ def _reading() -> float:
     return processor_time(lambda: load_scenario(_content()))[1]
 
 
-def within_readings(readings: float, work: Callable[[], Result]) -> Result:
-    """Return the result of `work`; fail if it takes more than `readings` times the reading of 10,000 parameters.
+def _readings() -> Iterator[float]:
+    """Yield processor times of readings [s]; only attempts after the first one need a reading beside them."""
+    yield _first_reading()
+    while True:
+        yield _reading()
 
-    Only attempts after the first one need a reading beside them.
-    """
-    units = chain([_first_reading], repeat(_reading))
-    return _within(readings, work, (unit() for unit in units), f"the reading of {ELEMENTS} parameters")
+
+def within_readings(readings: float, work: Callable[[], Result]) -> Result:
+    """Return the result of `work`; fail if it takes more than `readings` times the reading of 10,000 parameters."""
+    return _within(readings, work, _readings(), f"the reading of {ELEMENTS} parameters")
 
 
 def within_multiple(multiple: float, work: Callable[[], Result], part: Callable[[], object]) -> Result:

@@ -84,6 +84,8 @@ long. Both are powers of two."""
 MAX_ERROR = 1e-5
 """Maximum distance of such a cubic from the curve [m]: its curvature is the second derivative, and right to about
 0.001/m with cubics of 2 m."""
+PATH_CELLS = 16
+"""Number of cells of the quadrature of a path length."""
 BETWEEN = np.array([0.25, 0.5, 0.75])
 """Shares of a cubic at which its error is measured: in the middle alone it vanishes where the curve is symmetric."""
 
@@ -206,6 +208,10 @@ class Cubic(Curve):
         x, y = self.x + self.cos * u - self.sin * v, self.y + self.sin * u + self.cos * v
         return CurvePoint(x, y, self.h + math.atan2(dv, du), curvature, speed)
 
+    def path_length(self, end: float) -> float:
+        """Return the length of the path from p = 0 to `end` [m]."""
+        return float(_path_lengths(self, np.linspace(0.0, end, PATH_CELLS + 1))[-1])
+
     def _derivatives(self, p: float) -> tuple[float, float, float, float]:
         """Return the derivatives of u and v by p, the curvature [1/m], and the path length per meter of s."""
         _, u1, u2, u3 = self.u
@@ -257,32 +263,23 @@ def _over_arc_length(curve: Cubic, end: float, arc_length: float | None = None) 
     end         maximum of the parameter p
     arc_length  length of the curve [m]; without it the curve extends to `end`
     """
-    u0, u1, u2, u3 = curve.u
-    v0, v1, v2, v3 = curve.v
-
-    def tangent(p: Array) -> tuple[Array, Array, Array]:
-        """Return the derivatives of u and v by the parameter, and their norm."""
-        du, dv = u1 + p * (2.0 * u2 + 3.0 * p * u3), v1 + p * (2.0 * v2 + 3.0 * p * v3)
-        return du, dv, np.hypot(du, dv)
-
     nodes, weights = _quadrature()
     most = 2 ** math.ceil(math.log2(min(max(curve.length, MOST_CUBICS[0]), MOST_CUBICS[1])))
     edges = np.linspace(0.0, end, most * 4 + 1)
-    half = 0.5 * np.diff(edges)
-    middle = 0.5 * (edges[1:] + edges[:-1])
-    arc = np.concatenate([[0.0], np.cumsum(half * (tangent(middle[:, None] + half[:, None] * nodes)[2] @ weights))])
+    arc = _path_lengths(curve, edges)
     total = float(arc[-1]) if arc_length is None else arc_length
     knots = np.linspace(0.0, total, most * 4 + 1)
     # The parameter at the knots, by Newton's method within the cells of the quadrature
-    cell = np.clip(np.searchsorted(arc, knots, side="right") - 1, 0, len(half) - 1)
+    cell = np.clip(np.searchsorted(arc, knots, side="right") - 1, 0, len(edges) - 2)
     p = np.interp(knots, arc, edges)
     for _ in range(3):
         reach = 0.5 * (p - edges[cell])
-        inner = tangent(edges[cell, None] + reach[:, None] * (nodes + 1.0))[2] @ weights
-        p = p - (arc[cell] + reach * inner - knots) / np.maximum(tangent(p)[2], STANDSTILL)
+        inner = _tangents(curve, edges[cell, None] + reach[:, None] * (nodes + 1.0))[2] @ weights
+        p = p - (arc[cell] + reach * inner - knots) / np.maximum(_tangents(curve, p)[2], STANDSTILL)
         p = np.clip(p, edges[cell], edges[cell + 1])
-    du, dv, speed = tangent(p)
+    du, dv, speed = _tangents(curve, p)
     rate = total / curve.length / np.maximum(speed, STANDSTILL)
+    (u0, u1, u2, u3), (v0, v1, v2, v3) = curve.u, curve.v
     points = u0 + p * (u1 + p * (u2 + p * u3)), v0 + p * (v1 + p * (v2 + p * v3))
     count = 1
     while True:
@@ -304,6 +301,22 @@ def _over_arc_length(curve: Cubic, end: float, arc_length: float | None = None) 
         Cubic(curve.s + i * step, *start, step, tuple(along), tuple(across), line=curve.line)
         for i, (along, across) in enumerate(zip(*(part.tolist() for part in parts), strict=True))
     ]
+
+
+def _tangents(curve: Cubic, p: Array) -> tuple[Array, Array, Array]:
+    """Return the derivatives of u and v by the parameter, and their norm."""
+    (_, u1, u2, u3), (_, v1, v2, v3) = curve.u, curve.v
+    du, dv = u1 + p * (2.0 * u2 + 3.0 * p * u3), v1 + p * (2.0 * v2 + 3.0 * p * v3)
+    return du, dv, np.hypot(du, dv)
+
+
+def _path_lengths(curve: Cubic, edges: Array) -> Array:
+    """Return the lengths of the path from the first edge of the parameter to each of them [m]."""
+    nodes, weights = _quadrature()
+    half = 0.5 * np.diff(edges)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    speeds = _tangents(curve, middle[:, None] + half[:, None] * nodes)[2]
+    return np.concatenate([[0.0], np.cumsum(half * (speeds @ weights))])
 
 
 def _hermite(value: Array, slope: Array, step: float) -> Array:

@@ -75,11 +75,11 @@ class LaneLinks:
         for other in self._ends.get(RoadEnd(road, direction), ()):
             yield other.road, -other.side
 
-    def between_roads(self) -> Iterator[tuple[LaneEnd, LaneEnd]]:
-        """Yield linked ends of lanes of different roads, each pair once."""
+    def pairs(self) -> Iterator[tuple[LaneEnd, LaneEnd]]:
+        """Yield linked ends of lanes, each pair once."""
         for end, others in self._lanes.items():
             for other in others:
-                if end.lane.road < other.lane.road:
+                if (end.lane, end.side) < (other.lane, other.side):
                     yield end, other
 
     def _join(self, end: LaneEnd, other: LaneEnd) -> None:

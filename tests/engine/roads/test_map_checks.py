@@ -142,6 +142,51 @@ def test_gap_between_linked_lanes_is_a_warning() -> None:
         assert map_warnings(map_xml(first, second)) == ([("geometry-gap", what)] if apart else [])
 
 
+@pytest.mark.parametrize(
+    ("later", "gap"),
+    [
+        (lane(-1, '<predecessor id="-1"/>'), None),
+        (lane(-1, '<predecessor id="-1"/>', WIDTH.format(0, 3.0, 0, 0, 0)), ("-1", "0.25")),
+        (lane(-1) + lane(-2, '<predecessor id="-1"/>'), ("-2", "3.5")),
+        # A lane divides into two, which together are as wide
+        ("".join(lane(-n, '<predecessor id="-1"/>', WIDTH.format(0, 1.75, 0, 0, 0)) for n in (1, 2)), None),
+        ("".join(lane(-n, '<predecessor id="-1"/>', WIDTH.format(0, 2.0, 0, 0, 0)) for n in (1, 2)), ("-2", "1.25")),
+    ],
+)
+def test_gap_between_linked_lanes_within_a_road_is_a_warning(later: str, gap: tuple[str, str] | None) -> None:
+    lanes = section(0, lane(-1)) + section(60, later)
+    message = (
+        "lane -1 of road '1' (section at s = 0 m) and lane {} of road '1' (section at s = 60 m) are linked "
+        "but their ends are {} m apart"
+    )
+    gaps = [("geometry-gap", message.format(*gap))] if gap else []
+    assert map_warnings(map_xml(road_xml(lanes=lanes))) == gaps
+
+
+def test_step_of_the_lane_offset_that_renumbered_lanes_undo_is_no_gap() -> None:
+    offsets = "".join(f'<laneOffset s="{s}" a="{a}" b="0" c="0" d="0"/>' for s, a in ((0, 0.0), (60, -3.5)))
+    two = section(0, lane(-1, kind="border"), lane(-2, '<successor id="-1"/>'))
+    assert map_warnings(map_xml(road_xml(lanes=offsets + two + section(60, lane(-1))))) == []
+
+
+@pytest.mark.parametrize(
+    ("shape", "path"),
+    [
+        ('<paramPoly3 aU="0" bU="30" cU="0" dU="0" aV="0" bV="40" cV="0" dV="0"/>', None),
+        ('<paramPoly3 aU="0" bU="36" cU="0" dU="0" aV="0" bV="48" cV="0" dV="0"/>', "60"),
+        ('<paramPoly3 pRange="arcLength" aU="0" bU=".6" cU="0" dU="0" aV="0" bV=".8" cV="0" dV="0"/>', None),
+        ('<paramPoly3 pRange="arcLength" aU="0" bU=".6" cU="0" dU="0" aV="0" bV=".9" cV="0" dV="0"/>', "54.0833"),
+        # v = 25 p² over u = 50 p: √2 and asinh(1) of a parabola
+        ('<paramPoly3 aU="0" bU="50" cU="0" dU="0" aV="0" bV="0" cV="25" dV="0"/>', "57.3897"),
+    ],
+)
+def test_curve_of_another_length_than_stated_is_a_warning(shape: str, path: str | None) -> None:
+    geometry = f'<geometry s="0" x="0" y="0" hdg="0" length="50">{shape}</geometry>'
+    message = f"the curve of a geometry of road '1' is {path} m long, but its length is 50 m"
+    warnings = [("geometry-gap", message)] if path else []
+    assert map_warnings(map_xml(road_xml(length=50.0, geometry=geometry))) == warnings
+
+
 def test_ignored_lateral_profiles_are_warnings() -> None:
     def profile(*entries: str) -> list[tuple[str, str]]:
         return map_warnings(map_xml(road_xml(extra=f"<lateralProfile>{''.join(entries)}</lateralProfile>")))
@@ -251,5 +296,6 @@ def test_corpus_maps_have_only_known_warnings(corpora: Path) -> None:
         ("SampleDatabase.xodr", "lane-width"): [1807, 1807],
         ("SampleDatabase.xodr", "geometry-gap"): [3237, 3237],
         ("Town03.xodr", "lane-link"): [7913, 8040],
+        ("Town06.xodr", "geometry-gap"): [14443],
         ("parking_demo.xodr", "lane-link"): [564],
     }
