@@ -86,7 +86,7 @@ def test_80211p_delivery_ratio_under_load_agrees_with_ns3(per_km: int) -> None:
 def test_sidelink_delivery_ratio_agrees_with_wilabv2xsim(case: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """With the packet errors of WiLabV2Xsim, and its fixed threshold of the SCI.
 
-    WiLabV2Xsim counts from the start, where its stations have drawn resources without sensing: it is up to 0.04 lower.
+    At the start, stations of WiLabV2Xsim have drawn resources without sensing; cases with `counted_from` leave it out.
     """
     steps = (WILAB["sci_threshold_db"] - 1e-3, WILAB["sci_threshold_db"])
     control = ErrorCurve(steps, (1.0, 0.0), None, "threshold")
@@ -106,15 +106,18 @@ def test_sidelink_delivery_ratio_agrees_with_wilabv2xsim(case: dict[str, Any], m
             "nr_sidelink": {**pool, "transmissions": case.get("transmissions", 1)},
         },
     }
-    carrier = radio(
-        1, **ROAD, **pools[case["technology"]], jitter=0, packet_errors="data", queue={"discipline": "lcfs"}
-    )
+    settings: dict[str, Any] = {**ROAD, **pools[case["technology"]], "jitter": 0, "packet_errors": "data"}
     count = round(LENGTH * case["per_km"] / 1000.0)
-    random = np.random.default_rng(1)
-    lanes = random.integers(0, 6, count)
-    places = np.stack([random.uniform(0.0, LENGTH, count), 3.5 * lanes], axis=1)
-    speeds = np.where(lanes < 3, 1.0, -1.0) * 100.0 / 3.6
     classes = WILAB["class_m"] * np.arange(len(case["prr"]) + 1.0)
-    phases = random.uniform(0.0, PERIOD, count)
-    simulated = delivery_ratios(carrier, places, case["bytes"], classes, seconds=8.0, speeds=speeds, phases=phases)
-    assert simulated == pytest.approx(np.array(case["prr"]), abs=0.05)
+    simulated = []
+    for seed in range(4):
+        random = np.random.default_rng(seed)
+        lanes = random.integers(0, 6, count)
+        places = np.stack([random.uniform(0.0, LENGTH, count), 3.5 * lanes], axis=1)
+        speeds = np.where(lanes < 3, 1.0, -1.0) * 100.0 / 3.6
+        phases = random.uniform(0.0, PERIOD, count)
+        carrier = radio(seed, **settings, queue={"discipline": "lcfs"})
+        simulated.append(
+            delivery_ratios(carrier, places, case["bytes"], classes, seconds=6.0, speeds=speeds, phases=phases)
+        )
+    assert np.mean(simulated, axis=0) == pytest.approx(np.array(case["prr"]), abs=0.03)
