@@ -5,6 +5,7 @@ Stable: `ActionBehaviour`, `Condition` and its subclasses, `ControllerModel`, th
 """
 
 from eidrive_scenario import traffic as traffic
+from eidrive_scenario.base.installation import install_command as install_command
 from eidrive_scenario.base.requests import LONGEST_WAY as LONGEST_WAY
 from eidrive_scenario.base.requests import Goal as Goal
 from eidrive_scenario.base.requests import Override as Override

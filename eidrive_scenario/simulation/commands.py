@@ -94,7 +94,7 @@ def check_commands(scenario: Scenario) -> DeclaredCriteria:
         with errors:
             if command.type in readers:
                 readers[command.type](command)
-            elif command.type.startswith(PREFIX):
+            elif command.type.startswith(PREFIX) and command.type not in registry("actions"):
                 message = f"unknown command type {command.type!r}"
                 raise ScenarioError(Diagnostic.at(command, message, suggestion(command.type, readers)))
     errors.raise_if_any()

@@ -97,7 +97,7 @@ class Simulation:
             add_criteria(setup.added_criteria, self._state)
             resolved = resolve_settings(setup, seed, self.settings)
         except BaseException:
-            self.world.close()
+            self._free()
             raise
         if isinstance(source, ConcreteRun):
             resolved = resolved.of_distribution(source.number, source.assignments)
@@ -138,8 +138,13 @@ class Simulation:
         """Free the world and close the observers, each once, even if another raises. No tick can follow."""
         with ExitStack() as stack:
             self._observers.close(stack)
-            self.world.close()
+            self._free()
         self._is_closed = True
+
+    def _free(self) -> None:
+        """Free the world and the traffic of SUMO."""
+        self.storyboard.context.close()
+        self.world.close()
 
     def set_user_value(self, name: str, value: str) -> None:
         """Set the value of the UserDefinedValueConditions of this name from the next tick on.

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         sites_within_radius,
         stretches_cover,
     )
+    from eidrive_scenario.traffic.sumo.files import SumoFiles, sumo_files
 else:
     __getattr__ = lazy_exports(
         __name__,
@@ -37,6 +38,7 @@ else:
             "spawning.generators": "Area BackgroundTraffic Sink Source Swarm TrafficGenerator",
             "spawning.population": "Changes Population",
             "spawning.sites": "Cursor SpawnSites Stretch polygon road_range sites_within_radius stretches_cover",
+            "sumo.files": "SumoFiles sumo_files",
         },
     )
 
@@ -54,6 +56,7 @@ __all__ = [
     "Source",
     "SpawnSites",
     "Stretch",
+    "SumoFiles",
     "Swarm",
     "TrafficGenerator",
     "TrafficMix",
@@ -61,4 +64,5 @@ __all__ = [
     "road_range",
     "sites_within_radius",
     "stretches_cover",
+    "sumo_files",
 ]

@@ -30,6 +30,8 @@ from eidrive_scenario.world.view import WorldView
 if TYPE_CHECKING:
     from eidrive_scenario.traffic.spawning.generators import BackgroundTraffic, TrafficGenerator
     from eidrive_scenario.traffic.spawning.population import CentralObject
+    from eidrive_scenario.traffic.sumo.files import SumoFiles
+    from eidrive_scenario.traffic.sumo.traffic import SumoTraffic
 
 
 E = TypeVar("E", bound=model.Element)
@@ -135,6 +137,8 @@ class ConditionContext:
         }
         self.traffic: BackgroundTraffic | None = None
         """Background traffic; None before its first instance starts."""
+        self.sumo: SumoTraffic | None = None
+        """Traffic of SUMO; None before it starts."""
         self.position_cache = PositionCache()
         self.parting: set[frozenset[str]] = set()
         """Former pairs of a vehicle and its trailer that still overlap."""
@@ -161,7 +165,7 @@ class ConditionContext:
     @property
     def traffic_names(self) -> tuple[str, ...]:
         """Names of the vehicles of background traffic."""
-        return () if self.traffic is None else self.traffic.names
+        return tuple(name for traffic in (self.traffic, self.sumo) if traffic is not None for name in traffic.names)
 
     def pose(self, name: str) -> Pose:
         """Return the current pose of an actor. Raise EntityAbsentError if it is absent."""
@@ -318,6 +322,20 @@ class ActionContext(ConditionContext):
     def start_traffic(self, instance: TrafficGenerator) -> None:
         """Start an instance. Its first vehicles enter in this tick; in the first tick if it starts in Init."""
         self.background_traffic.start(instance)
+
+    def start_sumo(self, files: SumoFiles) -> None:
+        """Start the traffic of SUMO, once in a run. Raise SimulationError if SUMO refuses the files."""
+        from eidrive_scenario.traffic.sumo.traffic import SumoTraffic
+
+        assert self.roads is not None
+        self.sumo = SumoTraffic(
+            files, self.roads, self.signals, step=self.step, seed=self.seed, taken=frozenset(self.actors)
+        )
+
+    def close(self) -> None:
+        """End the traffic of SUMO."""
+        if self.sumo is not None:
+            self.sumo.close()
 
     def stop_traffic(self, name: str | None) -> None:
         """Stop all instances of background traffic of this name; all instances without a name."""

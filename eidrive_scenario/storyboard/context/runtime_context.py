@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from msgspec.structs import replace
 
@@ -15,6 +15,9 @@ from eidrive_scenario.storyboard.context.contexts import ActionContext, Controll
 from eidrive_scenario.storyboard.state.commands import NONE, Commands, ExternalPose
 from eidrive_scenario.storyboard.state.element_states import MOTION, Domain
 from eidrive_scenario.world.view import WorldView
+
+if TYPE_CHECKING:
+    from eidrive_scenario.traffic.spawning.population import Changes
 
 
 def _overlaps(view: WorldView, name: str, other: str) -> bool:
@@ -107,10 +110,13 @@ class RuntimeContext(ActionContext, ControllerContext):
 
     def step_traffic(self) -> None:
         """Add spawns, removals and placements of background traffic in the current step to the commands."""
-        if self.traffic is None:
-            return
-        invisible = [name for name, appearance in self.appearances.items() if not appearance.visibility.traffic]
-        changes, commands = self.traffic.step(self.view.without(invisible), self.dt), self.commands
+        for traffic in (self.traffic, self.sumo):
+            if traffic is not None:
+                invisible = [name for name, appearance in self.appearances.items() if not appearance.visibility.traffic]
+                self._apply(traffic.step(self.view.without(invisible), self.dt))
+
+    def _apply(self, changes: Changes) -> None:
+        commands = self.commands
         for name, (spec, placement) in changes.additions.items():
             commands.spawns[name] = placement
             commands.actor_specs[name] = spec

@@ -1,0 +1,131 @@
+"""Network and routes of SUMO: checks of the files, as SUMO would write files or read further ones for some of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from lxml import etree
+from pydantic import Field
+
+from eidrive_scenario.errors import Diagnostic, ErrorCollector, SettingError, quoted
+from eidrive_scenario.extensions.library import resolve_path
+from eidrive_scenario.extensions.settings import Settings, parse_settings
+from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
+from eidrive_scenario.files.untrusted_xml import XmlLimits, line_of, parse_untrusted
+from eidrive_scenario.files.yaml_text import key_lines, load_yaml
+from eidrive_scenario.openscenario.model import CustomCommandAction
+from eidrive_scenario.openscenario.values.parameters import resolve_references
+from eidrive_scenario.roads import RoadNetwork
+
+COMMAND = "eidrive.sumo"
+LIMITS = XmlLimits(max_bytes=256 * MIB, max_nodes=4_000_000)
+"""Limits of a file of SUMO."""
+LANES = 400
+"""Maximum number of lanes whose position is compared with the roads of the scenario."""
+MATCHING = 0.5
+"""Minimum share of them on the roads."""
+_WRITING = ("has.", "device.", "file")
+"""Starts of the keys of parameters by which SUMO writes files."""
+
+
+class SumoSettings(Settings):
+    """Content of a command `eidrive.sumo`; paths are relative to the scenario.
+
+    network  file of `netconvert`
+    routes   files of routes, trips and flows
+    """
+
+    network: str
+    routes: list[str] = Field(min_length=1)
+
+
+@dataclass(frozen=True)
+class SumoFiles:
+    """Checked files.
+
+    offset  of the coordinates of the network from those of the roads: x, y [m]
+    """
+
+    network: Path
+    routes: tuple[Path, ...]
+    offset: tuple[float, float]
+
+
+def sumo_files(command: CustomCommandAction, roads: RoadNetwork) -> SumoFiles:
+    """Return the files that a command `eidrive.sumo` states. Raise SettingError with all diagnostics."""
+    source, line = command.source, command.line
+    lines = key_lines(command.content, 1 if line is None else line)
+    data = load_yaml(command.content, source=source, line=line)
+    if not isinstance(data, dict):
+        hint = "write {network: town.net.xml, routes: [town.rou.xml]}"
+        raise SettingError(Diagnostic(f"{COMMAND}: no mapping of settings", hint, source, line))
+    data = resolve_references(data, command.scope, source=source, line=line, lines=lines)
+    settings = parse_settings(SumoSettings, data, source=source, line=line, lines=lines)
+    folder = Path(source).parent
+    network = resolve_path(settings.network, folder)
+    routes = tuple(resolve_path(path, folder) for path in settings.routes)
+    offset = (0.0, 0.0)
+    errors = ErrorCollector(SettingError)
+    with errors:
+        offset = _check_network(_root(network, "net"), str(network), roads)
+    for path in routes:
+        with errors:
+            _root(path, "routes")
+    errors.raise_if_any()
+    return SumoFiles(network, routes, offset)
+
+
+def _root(path: Path, kind: str) -> etree._Element:
+    """Return the root of a file, which must have the tag `kind`, and no effect but on the traffic."""
+    try:
+        content = read_regular_file(path, LIMITS.max_bytes)
+    except OSError as error:
+        hint = f"give the path of a file with the root <{kind}>"
+        raise SettingError(Diagnostic(f"cannot read {quoted(str(path))}: {reason_of(error)}", hint)) from error
+    root = parse_untrusted(content, str(path), LIMITS, SettingError)
+    if root.tag != kind:
+        message = f"the root element is {root.tag} (expected {kind})"
+        raise SettingError(Diagnostic(message, "check the kind of the file", str(path), line_of(root)))
+    errors = ErrorCollector(SettingError)
+    for element in root.iter("include", "param"):
+        with errors:
+            if element.tag == "include":
+                raise SettingError(Diagnostic("<include> is not read", "copy it", str(path), line_of(element)))
+            if element.get("key", "").startswith(_WRITING):
+                message = f"SUMO writes files by the parameter {quoted(element.get('key', ''))}"
+                raise SettingError(Diagnostic(message, "remove it", str(path), line_of(element)))
+    errors.raise_if_any()
+    return root
+
+
+def _check_network(root: etree._Element, source: str, roads: RoadNetwork) -> tuple[float, float]:
+    """Return the offset of a network, whose lanes must be on the roads."""
+    location = root.find("location")
+    try:
+        x, y = (float(part) for part in (location.get("netOffset", "") if location is not None else "").split(","))
+    except ValueError as error:
+        hint = "create the network by netconvert"
+        raise SettingError(Diagnostic("the network has no valid netOffset", hint, source, line_of(location))) from error
+    points = np.array(list(_lane_points(root)), dtype=np.float64).reshape(-1, 2)
+    points = points[:: len(points) // LANES + 1]
+    located = roads.locate(points[:, 0] - x, points[:, 1] - y)
+    share = float(np.mean((located.road >= 0) & (located.outside <= 0.0))) if len(points) else 0.0
+    if share < MATCHING:
+        message = f"only {share:.0%} of the lanes of the network are on the roads of the scenario"
+        hint = "create the network from the road file: netconvert --opendrive-files ROADS.xodr -o NETWORK.net.xml"
+        raise SettingError(Diagnostic(message, hint, source))
+    return x, y
+
+
+def _lane_points(root: etree._Element) -> Iterator[tuple[float, float]]:
+    """Yield a point of each lane outside of junctions."""
+    for edge in root.iterfind("edge"):
+        if edge.get("function", "normal") == "normal":
+            for lane in edge.iterfind("lane"):
+                points = lane.get("shape", "").split()
+                if points:
+                    x, y, *_ = points[len(points) // 2].split(",")
+                    yield float(x), float(y)

@@ -1,0 +1,229 @@
+"""Traffic of SUMO in simulation runs, compared with SUMO alone.
+
+The networks are of netconvert 1.28.0: `netconvert --opendrive-files xosc/roads/ROADS.xodr --no-turnarounds
+--opendrive.internal-shapes true --opendrive.curve-resolution 0.5`, without comments.
+"""
+
+from __future__ import annotations
+
+import gc
+import importlib.util
+import math
+import subprocess
+import sys
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from opendrive_xml import map_xml, road_xml
+from whole_run import RecordedRun, Run
+
+from eidrive_scenario.errors import InputError
+from eidrive_scenario.extensions.library import library_path
+from eidrive_scenario.openscenario import load_scenario
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.simulation import Simulation
+
+DATA = Path(__file__).parents[1] / "data"
+OFFSET = 80.0, 120.25
+"""Offset of the network four_way_signals [m]."""
+CAR = '<vType id="car" length="4.5" width="1.8" height="1.5" minGap="2.5" sigma="0"/>'
+EAST = '<trip id="east" type="car" depart="0" from="-1" to="-2" departLane="0" departPos="10" departSpeed="10"/>'
+MIXED = (
+    '<vType id="lorry" vClass="truck"/><vType id="bike" vClass="bicycle"/>'
+    f'{EAST}<trip id="north" type="lorry" depart="1" from="-4" to="-3"/>'
+    '<trip id="left" type="car" depart="2" from="2" to="4"/><trip id="right" type="bike" depart="2.5" from="3" to="1"/>'
+)
+PLAIN = """
+import sys, libsumo
+options = {"--net-file": sys.argv[1], "--route-files": sys.argv[2], "--step-length": "0.05", "--seed": "0",
+           "--lanechange.duration": "3", "--collision.action": "warn", "--time-to-teleport": "-1",
+           "--fcd-output": sys.argv[3], "--precision": "6"}
+libsumo.start(["sumo", *(part for option in options.items() for part in option)])
+for _ in range(int(sys.argv[4])):
+    libsumo.simulationStep()
+libsumo.close()
+"""
+needs_sumo = pytest.mark.skipif(importlib.util.find_spec("libsumo") is None, reason="libsumo is not installed")
+
+
+def command(network: object = DATA / "four_way_signals.net.xml", routes: str = "routes.rou.xml") -> str:
+    content = f"{{network: {network}, routes: [{routes}]}}"
+    action = f'<CustomCommandAction type="eidrive.sumo">{content}</CustomCommandAction>'
+    return f"<UserDefinedAction>{action}</UserDefinedAction>"
+
+
+@pytest.fixture
+def crossing(run: Run) -> Callable[..., RecordedRun]:
+    """Run with routes of SUMO at a crossing with traffic lights; Ego stands in the lane that leads south."""
+
+    def played(routes: str, end: float = 12.0, *, init: str = command(), **parts: object) -> RecordedRun:
+        (run.folder / "routes.rou.xml").write_text(f"<routes>{CAR}{routes}</routes>")
+        roads = (library_path() / "roads/four_way_signals.xodr").read_text()
+        stated = {"ego": (-1, 90.0, 0.0), "driven": False, "globally": init, "street": roads, **parts}
+        return run(end, **stated)  # type: ignore[arg-type]
+
+    return played
+
+
+def front(played: RecordedRun, name: str, tick: int) -> tuple[float, float] | None:
+    """Return the place of the front bumper of a car."""
+    view = played.frames[tick].view
+    if name not in view:
+        return None
+    row = view.rows[name]
+    (x, y, _, length, _, _, yaw) = view.boxes[row]
+    return x + 0.5 * length * math.cos(yaw), y + 0.5 * length * math.sin(yaw)
+
+
+@needs_sumo
+def test_positions_are_those_of_sumo_alone(run: Run, crossing: Callable[..., RecordedRun]) -> None:
+    """Ego stands where none of the routes leads."""
+    played = crossing(MIXED, 16.0, ego=(1, 60.0, 0.0))
+    output = run.folder / "fcd.xml"
+    network, routes = str(DATA / "four_way_signals.net.xml"), str(run.folder / "routes.rou.xml")
+    subprocess.run([sys.executable, "-c", PLAIN, network, routes, str(output), "330"], check=True)
+    compared = set()
+    for step in ElementTree.parse(output).getroot().iter("timestep"):
+        tick = round(float(step.attrib["time"]) / 0.05) + 1
+        expected = {f"sumo.{one.attrib['id']}": one.attrib for one in step.iter("vehicle")}
+        if tick >= len(played.frames):
+            break
+        assert {name for name in played.frames[tick].view.names if name != "Ego"} == set(expected)
+        for name, values in expected.items():
+            place = front(played, name, tick)
+            assert place is not None
+            stated = float(values["x"]) - OFFSET[0], float(values["y"]) - OFFSET[1]
+            assert place == pytest.approx(stated, abs=1e-3)
+            row = played.frames[tick].view.rows[name]
+            assert played.frames[tick].view.speed[row] == pytest.approx(float(values["speed"]), abs=0.6)
+            compared.add(name)
+    assert compared == {f"sumo.{name}" for name in ("east", "north", "left", "right")}
+    categories = {name: frame.view.categories[row] for frame in played.frames for name, row in frame.view.rows.items()}
+    assert categories["sumo.north"] == "truck"
+    assert categories["sumo.right"] == "bicycle"
+
+
+@needs_sumo
+def test_vehicle_of_sumo_stops_behind_a_standing_ego(crossing: Callable[..., RecordedRun]) -> None:
+    """With lane changes forbidden, it stops 2.5 m behind (minGap); Ego is a car of 4 m, whose center is its place."""
+    forbidden = CAR.replace('"car"', '"careful"').replace("/>", ' lcKeepRight="0" lcSpeedGain="0" lcStrategic="-1"/>')
+    trip = EAST.replace('type="car"', 'type="careful"')
+    played = crossing(forbidden + trip, 20.0, ego=(-2, 70.0, 0.0))
+    last = played.frames[-1].view
+    place = front(played, "sumo.east", -1)
+    assert place is not None
+    ego = last.boxes[last.rows["Ego"]]
+    assert ego[0] - 0.5 * ego[3] - place[0] == pytest.approx(2.5, abs=0.3)
+    assert last.speed[last.rows["sumo.east"]] == pytest.approx(0.0, abs=0.05)
+
+
+LIGHTS = """<TrafficSignals><TrafficSignalController name="lights">
+<Phase name="{0}" duration="100">{1}</Phase></TrafficSignalController></TrafficSignals>"""
+
+
+@needs_sumo
+@pytest.mark.parametrize(("state", "passes"), [("green", True), ("red", False)])
+def test_lights_of_the_scenario_apply_to_sumo(crossing: Callable[..., RecordedRun], state: str, passes: bool) -> None:
+    """The stop line of the lane that leads east is 16 m before the center of the crossing, at x = 26 m."""
+    states = "".join(f'<TrafficSignalState trafficSignalId="{n}0" state="{state}"/>' for n in range(1, 5))
+    played = crossing(EAST, 20.0, signals=LIGHTS.format(state, states))
+    ends = [place[0] for tick in range(len(played.frames)) if (place := front(played, "sumo.east", tick)) is not None]
+    assert (max(ends) > 60.0) == passes
+    if not passes:
+        assert 20.0 < max(ends) <= 26.0
+
+
+@needs_sumo
+def test_signals_follow_sumo_where_the_scenario_sets_none(crossing: Callable[..., RecordedRun]) -> None:
+    """The program of netconvert: 42 s green, 3 s yellow, then red, with signals 30 and 10 in turn."""
+    played = crossing(EAST, 50.0)
+    states = [(frame.signals.get("30"), frame.signals.get("10")) for frame in played.frames[1:]]
+    changes = [(0.05 * number, after) for number, (before, after) in enumerate(pairwise(states)) if before != after]
+    assert states[0] == ("green", "red")
+    assert [after for _, after in changes] == [("yellow", "red"), ("red", "green")]
+    assert [time for time, _ in changes] == pytest.approx([42.0, 45.0], abs=0.11)
+
+
+@needs_sumo
+def test_runs_repeat_and_end_sumo(crossing: Callable[..., RecordedRun]) -> None:
+    random = '<flow id="f" type="DEFAULT_VEHTYPE" begin="0" end="20" probability="0.4" from="-1" to="-2"/>'
+    first, second, other = (crossing(random, seed=seed).result.trace_hash for seed in (3, 3, 4))
+    assert first == second
+    assert first != other
+
+
+@needs_sumo
+def test_vehicles_of_sumo_are_on_the_surface_of_hills(run: Run) -> None:
+    path = library_path() / "roads/crest_road.xodr"
+    trip = '<trip id="over" type="car" depart="0" from="-1" to="-1" departPos="10" departSpeed="13"/>'
+    (run.folder / "routes.rou.xml").write_text(f"<routes>{CAR}{trip}</routes>")
+    init = command(DATA / "crest_road.net.xml")
+    played = run(40.0, ego=(1, 20.0, 0.0), driven=False, globally=init, street=path.read_text())
+    roads = RoadNetwork.load(path)
+    views = [frame.view for frame in played.frames if "sumo.over" in frame.view]
+    rows = [view.rows["sumo.over"] for view in views]
+    heights = [float(view.position[row, 2]) for view, row in zip(views, rows, strict=True)]
+    assert max(heights) - min(heights) > 2.0
+    for view, row, height in zip(views, rows, heights, strict=True):
+        x, y, _ = view.position[row]
+        location = roads.locate_at(float(x), float(y))
+        assert location is not None
+        surface = roads.pose(location)
+        assert (height, float(view.pitch[row])) == pytest.approx((surface.z, surface.p), abs=0.01)
+
+
+@needs_sumo
+@pytest.mark.parametrize(
+    ("routes", "expected"),
+    [
+        ('<include href="more.xml"/>', "<include> is not read"),
+        ('<vType id="t"><param key="has.ssm.device" value="true"/></vType>', "SUMO writes files by the parameter"),
+        ("</routes><routes>", "not well-formed XML"),
+    ],
+)
+def test_routes_that_reach_beyond_the_traffic_are_errors(
+    crossing: Callable[..., RecordedRun], routes: str, expected: str
+) -> None:
+    with pytest.raises(InputError, match=expected):
+        crossing(routes)
+
+
+@needs_sumo
+def test_files_that_do_not_fit_are_errors(run: Run, crossing: Callable[..., RecordedRun]) -> None:
+    with pytest.raises(InputError, match=r"cannot read .*gone\.xml"):
+        crossing("", init=command(routes="gone.xml"))
+    with pytest.raises(InputError, match=r"cannot read .*gone\.net\.xml"):
+        crossing("", init=command("gone.net.xml"))
+    with pytest.raises(InputError, match="the root element is routes"):
+        crossing("", init=command("routes.rou.xml"))
+    with pytest.raises(InputError, match="lanes of the network are on the roads of the scenario"):
+        crossing("", street=map_xml(road_xml(y=500.0)))
+    with pytest.raises(InputError, match="unknown setting 'route'"):
+        crossing("", init=command().replace("routes:", "route:"))
+    with pytest.raises(InputError, match="has started already"):
+        crossing("", init=2 * command())
+    with pytest.raises(InputError, match="SUMO: "):
+        crossing('<trip id="a" depart="0" from="-1" to="nowhere"/>')
+
+
+@needs_sumo
+def test_only_one_simulation_of_a_process_has_sumo(run: Run, crossing: Callable[..., RecordedRun]) -> None:
+    crossing(EAST, 1.0)
+    scenario = load_scenario(run.folder / "scene.xosc")
+    with Simulation(scenario), pytest.raises(InputError, match="SUMO runs in this process already"):
+        Simulation(scenario)
+    Simulation(scenario)  # that nobody closes
+    gc.collect()
+    with Simulation(scenario):
+        pass
+
+
+def test_sumo_that_is_not_installed_is_an_error(
+    crossing: Callable[..., RecordedRun], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    with pytest.raises(InputError, match=r"libsumo is not installed.*pip install .*\[sumo\]"):
+        crossing(EAST)
