@@ -32,8 +32,8 @@ OFFSET = 80.0, 120.25
 CAR = '<vType id="car" length="4.5" width="1.8" height="1.5" minGap="2.5" sigma="0"/>'
 EAST = '<trip id="east" type="car" depart="0" from="-1" to="-2" departLane="0" departPos="10" departSpeed="10"/>'
 MIXED = (
-    '<vType id="lorry" vClass="truck"/><vType id="bike" vClass="bicycle"/>'
-    f'{EAST}<trip id="north" type="lorry" depart="1" from="-4" to="-3"/>'
+    '<vType id="heavy" vClass="truck"/><vType id="bike" vClass="bicycle"/>'
+    f'{EAST}<trip id="north" type="heavy" depart="1" from="-4" to="-3"/>'
     '<trip id="left" type="car" depart="2" from="2" to="4"/><trip id="right" type="bike" depart="2.5" from="3" to="1"/>'
 )
 PLAIN = """
@@ -181,10 +181,12 @@ def test_vehicles_of_sumo_are_on_the_surface_of_hills(run: Run) -> None:
     [
         ('<include href="more.xml"/>', "<include> is not read"),
         ('<vType id="t"><param key="has.ssm.device" value="true"/></vType>', "SUMO writes files by the parameter"),
+        ('<vType id="\x9b"/>', r"the id '\\x9b' has control characters"),
+        ('<trip id="a" depart="2"/><trip id="b" depart="1"/>', "the departure at 1 s is after one at 2 s"),
         ("</routes><routes>", "not well-formed XML"),
     ],
 )
-def test_routes_that_reach_beyond_the_traffic_are_errors(
+def test_routes_with_hidden_or_further_effects_are_errors(
     crossing: Callable[..., RecordedRun], routes: str, expected: str
 ) -> None:
     with pytest.raises(InputError, match=expected):
@@ -215,7 +217,7 @@ def test_only_one_simulation_of_a_process_has_sumo(run: Run, crossing: Callable[
     scenario = load_scenario(run.folder / "scene.xosc")
     with Simulation(scenario), pytest.raises(InputError, match="SUMO runs in this process already"):
         Simulation(scenario)
-    Simulation(scenario)  # that nobody closes
+    Simulation(scenario)  # it is not closed
     gc.collect()
     with Simulation(scenario):
         pass

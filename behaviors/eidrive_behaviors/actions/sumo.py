@@ -27,7 +27,7 @@ class SumoAction(ActionBehaviour):
         try:
             self._files: traffic.SumoFiles = traffic.sumo_files(self.action, roads)
         except SettingError as error:
-            raise ScenarioError(error.diagnostics) from error
+            raise ScenarioError(error.at(self.action.source, self.action.line).diagnostics) from error
 
     def update(self) -> Status:
         """Start SUMO."""
@@ -41,4 +41,4 @@ class SumoAction(ActionBehaviour):
 
     def describe(self) -> str:
         """Describe the network."""
-        return f"traffic of SUMO on {self._files.network.name}"
+        return f"traffic of SUMO on {self._files.name}"

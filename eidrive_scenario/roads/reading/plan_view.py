@@ -22,8 +22,10 @@ MAX_CUBICS = 200_000
 """Maximum number of cubics over arc length that replace all poly3 and normalized paramPoly3 of a file, as each takes
 memory."""
 CUBICS = "parts of poly3 and normalized paramPoly3"
-MAX_LENGTH_ERROR = 0.01
-"""Maximum difference of the length of a paramPoly3 from that of its curve [m]."""
+MAX_LENGTH_ERROR, LENGTH_ERROR_SHARE, LENGTH_ROUNDING = 0.1, 0.01, 0.01
+"""Maximum difference of the length of a paramPoly3 from that of its curve [m], also as a share of the length, and the
+difference that counts as rounding [m]. Maps of netconvert differ by up to 3 cm in 15 m.
+"""
 SHORTEST = 1e-9
 """Maximum length of a geometry that is omitted [m]. Geometries of length 0 occur in real maps."""
 
@@ -110,7 +112,7 @@ def _read_cubic(
         collector.report_error(geometry, message, f"at most {MAX_SHAPE:g} m are read")
         return [cubic]
     path = length if span == "u" else cubic.path_length(end)
-    if abs(path - length) > MAX_LENGTH_ERROR:
+    if abs(path - length) > min(MAX_LENGTH_ERROR, max(LENGTH_ERROR_SHARE * length, LENGTH_ROUNDING)):
         message = f"the curve of a geometry of road {road_id!r} is {path:.6g} m long, but its length is {length:.6g} m"
         hint = "correct the length, or the polynomials"
         collector.report_warning(geometry, MapRule.GEOMETRY_GAP, "curves of another length", message, hint)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from eidrive_scenario.errors import Diagnostic, ErrorCollector, SettingError, qu
 from eidrive_scenario.extensions.library import resolve_path
 from eidrive_scenario.extensions.settings import Settings, parse_settings
 from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
+from eidrive_scenario.files.encodable import printable
 from eidrive_scenario.files.untrusted_xml import XmlLimits, line_of, parse_untrusted
 from eidrive_scenario.files.yaml_text import key_lines, load_yaml
 from eidrive_scenario.openscenario.model import CustomCommandAction
@@ -44,13 +46,15 @@ class SumoSettings(Settings):
 
 @dataclass(frozen=True)
 class SumoFiles:
-    """Checked files.
+    """Contents of the checked files.
 
+    name    name of the network file
     offset  of the coordinates of the network from those of the roads: x, y [m]
     """
 
-    network: Path
-    routes: tuple[Path, ...]
+    name: str
+    network: bytes
+    routes: tuple[bytes, ...]
     offset: tuple[float, float]
 
 
@@ -66,20 +70,24 @@ def sumo_files(command: CustomCommandAction, roads: RoadNetwork) -> SumoFiles:
     settings = parse_settings(SumoSettings, data, source=source, line=line, lines=lines)
     folder = Path(source).parent
     network = resolve_path(settings.network, folder)
-    routes = tuple(resolve_path(path, folder) for path in settings.routes)
-    offset = (0.0, 0.0)
+    routes: list[bytes] = []
+    content, offset = b"", (0.0, 0.0)
     errors = ErrorCollector(SettingError)
     with errors:
-        offset = _check_network(_root(network, "net"), str(network), roads)
-    for path in routes:
+        content, root = _read(network, "net")
+        offset = _check_network(root, str(network), roads)
+    for path in settings.routes:
         with errors:
-            _root(path, "routes")
+            file = resolve_path(path, folder)
+            route, root = _read(file, "routes")
+            routes.append(route)
+            _check_order(root, str(file))
     errors.raise_if_any()
-    return SumoFiles(network, routes, offset)
+    return SumoFiles(network.name, content, tuple(routes), offset)
 
 
-def _root(path: Path, kind: str) -> etree._Element:
-    """Return the root of a file, which must have the tag `kind`, and no effect but on the traffic."""
+def _read(path: Path, kind: str) -> tuple[bytes, etree._Element]:
+    """Return content and root of a file, which must have the tag `kind`, and no effect but on the traffic."""
     try:
         content = read_regular_file(path, LIMITS.max_bytes)
     except OSError as error:
@@ -90,15 +98,32 @@ def _root(path: Path, kind: str) -> etree._Element:
         message = f"the root element is {root.tag} (expected {kind})"
         raise SettingError(Diagnostic(message, "check the kind of the file", str(path), line_of(root)))
     errors = ErrorCollector(SettingError)
-    for element in root.iter("include", "param"):
+    for element in root.iter("*"):
         with errors:
+            name, key = element.get("id", ""), element.get("key", "")
             if element.tag == "include":
                 raise SettingError(Diagnostic("<include> is not read", "copy it", str(path), line_of(element)))
-            if element.get("key", "").startswith(_WRITING):
-                message = f"SUMO writes files by the parameter {quoted(element.get('key', ''))}"
+            if element.tag == "param" and key.startswith(_WRITING):
+                message = f"SUMO writes files by the parameter {quoted(key)}"
                 raise SettingError(Diagnostic(message, "remove it", str(path), line_of(element)))
+            if printable(name) != name:
+                message = f"the id {quoted(name)} has control characters"
+                raise SettingError(Diagnostic(message, "remove them", str(path), line_of(element)))
     errors.raise_if_any()
-    return root
+    return content, root
+
+
+def _check_order(root: etree._Element, source: str) -> None:
+    """Require the order of departures, as SUMO ignores all others."""
+    latest = 0.0
+    for element in root:
+        stated = element.get("depart", element.get("begin", ""))
+        with suppress(ValueError):  # such as "triggered"
+            time = float(stated)
+            if time < latest:
+                message = f"the departure at {time:g} s is after one at {latest:g} s; SUMO would ignore it"
+                raise SettingError(Diagnostic(message, "sort the file by departure", source, line_of(element)))
+            latest = time
 
 
 def _check_network(root: etree._Element, source: str, roads: RoadNetwork) -> tuple[float, float]:

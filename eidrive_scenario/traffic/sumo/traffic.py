@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
-import sys
 import weakref
 from collections.abc import Iterator, Mapping
 from contextlib import redirect_stdout
 from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
 from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.errors import SimulationError
+from eidrive_scenario.openscenario.model.entity_enumerations import Role
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.roads.model.signal_states import GREEN, OFF, ON, RED, YELLOW, lamps
 from eidrive_scenario.traffic.spawning.bodies import library_bodies
@@ -24,8 +27,6 @@ NAME = "sumo"
 """Prefix of the names of its road users in the world, and of all other actors in SUMO."""
 LANE_CHANGE = 3.0
 """Duration of a lane change [s]; by default SUMO changes lanes in one step."""
-RESOLUTION = 1e-3
-"""Resolution of time in SUMO [s]."""
 BODIES = {
     "pedestrian": "pedestrian",
     "wheelchair": "pedestrian",
@@ -37,6 +38,7 @@ BODIES = {
     "coach": "bus",
     "tram": "bus",
     "delivery": "van",
+    "emergency": "van",
     "truck": "truck",
     "trailer": "truck",
 }
@@ -103,6 +105,11 @@ def _letter(state: str, green: str) -> str:
     return "O" if green == "G" else "o"
 
 
+def _end(libsumo: Any, folder: TemporaryDirectory[str]) -> None:
+    libsumo.close()
+    folder.cleanup()
+
+
 class SumoTraffic:
     """Simulation of SUMO that runs with the world; only one can run in a process.
 
@@ -123,7 +130,7 @@ class SumoTraffic:
         seed: int,
         taken: frozenset[str],
     ) -> None:
-        with redirect_stdout(sys.stderr):  # of a notice about pyarrow, as stdout may be JSON
+        with redirect_stdout(StringIO()):  # of a notice about the version of pyarrow, whose functions are not used
             import libsumo
 
         self._sumo: Any = libsumo
@@ -136,9 +143,14 @@ class SumoTraffic:
         """Names of the mirrored actors in SUMO."""
         if libsumo.simulation.isLoaded():
             raise SimulationError("SUMO runs in this process already; run the scenarios in separate processes")
+        folder = TemporaryDirectory(prefix="eidrive-sumo-")  # of copies, as SUMO reads routes during the run
+        names = ["network.net.xml", *(f"{number}.rou.xml" for number in range(len(files.routes)))]
+        for name, content in zip(names, (files.network, *files.routes), strict=True):
+            (Path(folder.name) / name).write_bytes(content)
+        network, *routes = (str(Path(folder.name) / name) for name in names)
         options = {
-            "--net-file": str(files.network),
-            "--route-files": ",".join(map(str, files.routes)),
+            "--net-file": network,
+            "--route-files": ",".join(routes),
             "--step-length": f"{step:.3f}",
             "--seed": str(seed % 2**31),
             "--lanechange.duration": f"{LANE_CHANGE:g}",
@@ -148,8 +160,9 @@ class SumoTraffic:
             "--xml-validation.net": "never",
             "--xml-validation.routes": "never",
             "--no-step-log": "true",
+            "--no-warnings": "true",
         }
-        self.close = weakref.finalize(self, libsumo.close)
+        self.close = weakref.finalize(self, _end, libsumo, folder)
         """End the simulation; also done when the object is dropped."""
         try:
             libsumo.start(["sumo", *(part for option in options.items() for part in option)])
@@ -229,8 +242,11 @@ class SumoTraffic:
 
     def _spec(self, users: Any, user: str, name: str) -> ActorSpec:
         """Return the body of a road user: that of the library by its class, in its size."""
-        category = BODIES.get(users.getVehicleClass(user), "car")
-        body = _PEDESTRIAN if category == "pedestrian" else library_bodies(category)[0][0]
+        kind = users.getVehicleClass(user)
+        category = BODIES.get(kind, "car")
+        role = Role.AMBULANCE if kind == "emergency" else Role.NONE
+        bodies = () if category == "pedestrian" else library_bodies(category)
+        body = next((body for body, own in bodies if own is role), _PEDESTRIAN)
         size = (users.getLength(user), users.getWidth(user), users.getHeight(user))
         scale = size[0] / body.size[0]
         offset = (body.offset[0] * scale, 0.0, 0.5 * size[2])

@@ -175,6 +175,7 @@ def test_step_of_the_lane_offset_that_renumbered_lanes_undo_is_no_gap() -> None:
         ('<paramPoly3 aU="0" bU="30" cU="0" dU="0" aV="0" bV="40" cV="0" dV="0"/>', None),
         ('<paramPoly3 aU="0" bU="36" cU="0" dU="0" aV="0" bV="48" cV="0" dV="0"/>', "60"),
         ('<paramPoly3 pRange="arcLength" aU="0" bU=".6" cU="0" dU="0" aV="0" bV=".8" cV="0" dV="0"/>', None),
+        ('<paramPoly3 aU="0" bU="30.03" cU="0" dU="0" aV="0" bV="40.04" cV="0" dV="0"/>', None),
         ('<paramPoly3 pRange="arcLength" aU="0" bU=".6" cU="0" dU="0" aV="0" bV=".9" cV="0" dV="0"/>', "54.0833"),
         # v = 25 p² over u = 50 p: √2 and asinh(1) of a parabola
         ('<paramPoly3 aU="0" bU="50" cU="0" dU="0" aV="0" bV="0" cV="25" dV="0"/>', "57.3897"),
