@@ -23,8 +23,8 @@ from eidrive_scenario.traffic.sumo.files import SumoFiles
 from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.view import WorldView
 
-NAME = "sumo"
-"""Prefix of the names of its road users in the world, and of all other actors in SUMO."""
+NAME, MIRRORED = "sumo", "eidrive"
+"""Prefixes of the names of its road users in the world, and of all other actors in SUMO."""
 LANE_CHANGE = 3.0
 """Duration of a lane change [s]; by default SUMO changes lanes in one step."""
 BODIES = {
@@ -62,11 +62,11 @@ class TrafficLight:
 
     def __init__(self, lights: Any, name: str, signals: SignalStates) -> None:
         self._lights, self._name, self._signals = lights, name, signals
-        programs = lights.getAllProgramLogics(name)
-        phases = [phase.state for program in programs for phase in program.phases]
-        self._green = ["g" if any(state[link] == "g" for state in phases) else "G" for link in range(len(phases[0]))]
+        links = range(len(lights.getRedYellowGreenState(name)))
+        phases = [phase.state for program in lights.getAllProgramLogics(name) for phase in program.phases]
+        self._green = ["g" if any(state[link : link + 1] == "g" for state in phases) else "G" for link in links]
         """Letter for green of each link: g yields to others."""
-        named = (lights.getParameter(name, f"linkSignalID:{link}") for link in range(len(self._green)))
+        named = (lights.getParameter(name, f"linkSignalID:{link}") for link in links)
         self._links = {link: signal for link, signal in enumerate(named) if signal}
         self._published: dict[str, str] = {}
         self._is_led = False
@@ -167,7 +167,7 @@ class SumoTraffic:
         try:
             libsumo.start(["sumo", *(part for option in options.items() for part in option)])
             edges = [edge for edge in libsumo.edge.getIDList() if not edge.startswith(":")]
-            libsumo.route.add(NAME, edges[:1])
+            libsumo.route.add(MIRRORED, edges[:1])
         except libsumo.libsumo.TraCIException as error:
             self.close()
             raise SimulationError(f"SUMO: {error}") from error
@@ -217,13 +217,14 @@ class SumoTraffic:
         for name, (x, y, _, length, width, height, yaw) in zip(view.names, view.boxes.tolist(), strict=True):
             if name in self._specs:
                 continue
-            vehicle = f"{NAME}.{name}"
+            vehicle = f"{MIRRORED}.{name}"
             present.add(vehicle)
             if vehicle not in self._mirrored:
                 self._sumo.vehicletype.copy("DEFAULT_VEHTYPE", vehicle)
                 for key, value in (("Length", length), ("Width", width), ("Height", height)):
                     getattr(self._sumo.vehicletype, f"set{key}")(vehicle, max(value, 0.1))
-                vehicles.add(vehicle, NAME, vehicle)
+                self._sumo.vehicletype.setVehicleClass(vehicle, "ignoring")  # on every lane
+                vehicles.add(vehicle, MIRRORED, vehicle)
                 vehicles.setSpeedMode(vehicle, 0)
                 vehicles.setLaneChangeMode(vehicle, 0)
                 self._mirrored.add(vehicle)
