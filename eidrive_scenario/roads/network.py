@@ -312,6 +312,12 @@ class RoadNetwork:
         pose = poses.lane_pose_at(road, location.lane, location.s, location.offset)
         return pose if road.driving_direction(location.lane) > 0 else pose.turned(np.pi)
 
+    def laid(self, pose: Pose, location: LaneLocation) -> Pose:
+        """Return a pose with the height, pitch and roll of the surface at a location."""
+        surface = self.pose(location)
+        level = surface.turned(wrap_angle(pose.h - surface.h))
+        return pose._replace(z=surface.z, p=level.p, r=level.r)
+
     def road_pose(self, road_id: str, s: ArrayLike, t: ArrayLike = 0.0) -> Poses:
         """Return `road_pose_at` for broadcast arrays. Raise PositionError."""
         self.road(road_id)

@@ -328,14 +328,7 @@ def on_surface(
     height  height near which the surface is where roads overlap [m]
     """
     location = roads.locate_at(pose.x, pose.y, near, height)
-    return (pose, None) if location is None else (laid_on_lane(pose, roads, location), location)
-
-
-def laid_on_lane(pose: Pose, roads: RoadNetwork, location: LaneLocation) -> Pose:
-    """Return a pose with the height, pitch and roll of the surface at a location."""
-    surface = roads.pose(location)
-    level = surface.turned(wrap_angle(pose.h - surface.h))
-    return pose._replace(z=surface.z, p=level.p, r=level.r)
+    return (pose, None) if location is None else (roads.laid(pose, location), location)
 
 
 def _between(first: tuple[float, Pose], last: tuple[float, Pose], spacing: float) -> Iterator[tuple[float, Pose]]:

@@ -12,7 +12,6 @@ from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork, Route
 from eidrive_scenario.storyboard.context.contexts import ConditionContext
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
-from eidrive_scenario.storyboard.kinematics.trajectory_sampling import laid_on_lane
 
 
 def oriented(orientation: model.Orientation | None, base: Pose) -> Pose:
@@ -117,7 +116,7 @@ def on_ground(
     hint, height = (None, pose.z if z_given else None) if near is None else (context.location(near), pose.z)
     here = context.roads.locate_pose(pose.x, pose.y, pose.h if h_given else None, height, hint)
     if here is not None and not z_given:
-        level = laid_on_lane(pose, context.roads, here)
+        level = context.roads.laid(pose, here)
         pose = level._replace(p=pose.p or level.p, r=pose.r or level.r)
     return ResolvedPosition(pose, here)
 

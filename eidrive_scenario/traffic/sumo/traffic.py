@@ -15,7 +15,7 @@ from typing import Any, Protocol
 from eidrive_scenario.base.geometry import wrap_angle
 from eidrive_scenario.errors import SimulationError
 from eidrive_scenario.openscenario.model.entity_enumerations import Role
-from eidrive_scenario.roads import LaneLocation, RoadNetwork
+from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.roads.model.signal_states import GREEN, OFF, ON, RED, YELLOW, lamps
 from eidrive_scenario.traffic.spawning.bodies import library_bodies
 from eidrive_scenario.traffic.spawning.population import Changes
@@ -265,6 +265,5 @@ class SumoTraffic:
         location = self._locations[name] = self._roads.locate_at(x, y, self._locations.get(name), height)
         if location is None:
             return Placement(x, y, height, yaw, speed=speed)
-        surface = self._roads.pose(location)
-        level = surface.turned(wrap_angle(yaw - surface.h))
-        return Placement(x, y, surface.z, yaw, level.p, level.r, speed)
+        laid = self._roads.laid(Pose(x, y, height, yaw, 0.0, 0.0), location)
+        return Placement(*laid, speed)
