@@ -282,6 +282,9 @@ def _gaps(roads: Mapping[str, Road], links: LaneLinks) -> Iterator[MapWarning]:
             points.append((x + t * dx, y + t * dy))
             widths.append(lane.width.value(ds))
         apart = math.dist(*points)
+        if apart <= JUMP:
+            continue
+        # A lane that divides contains its parts
         is_split = any(len(list(links.beyond(end.lane, end.side))) > 1 for end in ends)
         if apart > JUMP + (0.5 * abs(widths[0] - widths[1]) if is_split else 0.0):
             is_inside = ends[0].lane.road == ends[1].lane.road

@@ -203,6 +203,12 @@ def test_files_that_do_not_fit_are_errors(run: Run, crossing: Callable[..., Reco
         crossing("", init=command("routes.rou.xml"))
     with pytest.raises(InputError, match="lanes of the network are on the roads of the scenario"):
         crossing("", street=map_xml(road_xml(y=500.0)))
+    network = (DATA / "four_way_signals.net.xml").read_text()
+    for valid, invalid in (('netOffset="80.00,120.25"', 'netOffset="nan,1"'), ('shape="0.00,116.75', 'shape="?')):
+        assert valid in network
+        (run.folder / "broken.net.xml").write_text(network.replace(valid, invalid).replace(" 106.00,116.75", ""))
+        with pytest.raises(InputError, match="the network has no valid"):
+            crossing("", init=command("broken.net.xml"))
     with pytest.raises(InputError, match="unknown setting 'route'"):
         crossing("", init=command().replace("routes:", "route:"))
     with pytest.raises(InputError, match="has started already"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -129,12 +130,8 @@ def _check_order(root: etree._Element, source: str) -> None:
 def _check_network(root: etree._Element, source: str, roads: RoadNetwork) -> tuple[float, float]:
     """Return the offset of a network, whose lanes must be on the roads."""
     location = root.find("location")
-    try:
-        x, y = (float(part) for part in (location.get("netOffset", "") if location is not None else "").split(","))
-    except ValueError as error:
-        hint = "create the network by netconvert"
-        raise SettingError(Diagnostic("the network has no valid netOffset", hint, source, line_of(location))) from error
-    points = np.array(list(_lane_points(root)), dtype=np.float64).reshape(-1, 2)
+    x, y = _point("" if location is None else location.get("netOffset", ""), "netOffset", source, location)
+    points = np.array(list(_lane_points(root, source)), dtype=np.float64).reshape(-1, 2)
     points = points[:: len(points) // LANES + 1]
     located = roads.locate(points[:, 0] - x, points[:, 1] - y)
     share = float(np.mean((located.road >= 0) & (located.outside <= 0.0))) if len(points) else 0.0
@@ -145,12 +142,20 @@ def _check_network(root: etree._Element, source: str, roads: RoadNetwork) -> tup
     return x, y
 
 
-def _lane_points(root: etree._Element) -> Iterator[tuple[float, float]]:
+def _lane_points(root: etree._Element, source: str) -> Iterator[tuple[float, float]]:
     """Yield a point of each lane outside of junctions."""
     for edge in root.iterfind("edge"):
         if edge.get("function", "normal") == "normal":
             for lane in edge.iterfind("lane"):
                 points = lane.get("shape", "").split()
-                if points:
-                    x, y, *_ = points[len(points) // 2].split(",")
-                    yield float(x), float(y)
+                yield _point(points[len(points) // 2] if points else "", "shape of a lane", source, lane)
+
+
+def _point(text: str, name: str, source: str, element: etree._Element | None) -> tuple[float, float]:
+    """Return the plane coordinates of a point as in files of SUMO. Raise SettingError if they are not finite."""
+    with suppress(ValueError):
+        x, y, *_ = (float(part) for part in text.split(","))
+        if math.isfinite(x) and math.isfinite(y):
+            return x, y
+    diagnostic = Diagnostic(f"the network has no valid {name}", "create it by netconvert", source, line_of(element))
+    raise SettingError(diagnostic)
