@@ -20,7 +20,7 @@ import pytest
 from opendrive_xml import map_xml, road_xml
 from whole_run import RecordedRun, Run
 
-from eidrive_scenario.errors import InputError
+from eidrive_scenario.errors import InputError, SimulationError
 from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.roads import RoadNetwork
@@ -204,7 +204,13 @@ def test_files_that_do_not_fit_are_errors(run: Run, crossing: Callable[..., Reco
     with pytest.raises(InputError, match="lanes of the network are on the roads of the scenario"):
         crossing("", street=map_xml(road_xml(y=500.0)))
     network = (DATA / "four_way_signals.net.xml").read_text()
-    for valid, invalid in (('netOffset="80.00,120.25"', 'netOffset="nan,1"'), ('shape="0.00,116.75', 'shape="?')):
+    changes = (
+        ('netOffset="80.00,120.25"', 'netOffset="nan,1"'),
+        ('shape="0.00,116.75', 'shape="?'),
+        (' length="106.00"', ""),
+        ('speed="13.89"', 'speed="x"'),
+    )
+    for valid, invalid in changes:
         assert valid in network
         (run.folder / "broken.net.xml").write_text(network.replace(valid, invalid).replace(" 106.00,116.75", ""))
         with pytest.raises(InputError, match="the network has no valid"):
@@ -215,6 +221,14 @@ def test_files_that_do_not_fit_are_errors(run: Run, crossing: Callable[..., Reco
         crossing("", init=2 * command())
     with pytest.raises(InputError, match="SUMO: "):
         crossing('<trip id="a" depart="0" from="-1" to="nowhere"/>')
+
+
+@needs_sumo
+@pytest.mark.parametrize("length", ["5000", "nan"])
+def test_size_without_a_body_is_an_error(crossing: Callable[..., RecordedRun], length: str) -> None:
+    long = CAR.replace('"car"', '"long"').replace('length="4.5"', f'length="{length}"')
+    with pytest.raises(SimulationError, match="SUMO: 'east' has a size"):
+        crossing(long + EAST.replace('type="car"', 'type="long"'), 3.0)
 
 
 @needs_sumo

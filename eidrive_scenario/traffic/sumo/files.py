@@ -129,6 +129,9 @@ def _check_order(root: etree._Element, source: str) -> None:
 
 def _check_network(root: etree._Element, source: str, roads: RoadNetwork) -> tuple[float, float]:
     """Return the offset of a network, whose lanes must be on the roads."""
+    for lane in root.iter("lane"):  # SUMO ends the process at lanes without a length
+        for name in ("length", "speed"):
+            _point(f"{lane.get(name, '')},0", f"{name} of a lane", source, lane)
     location = root.find("location")
     x, y = _point("" if location is None else location.get("netOffset", ""), "netOffset", source, location)
     points = np.array(list(_lane_points(root, source)), dtype=np.float64).reshape(-1, 2)

@@ -27,6 +27,8 @@ NAME, MIRRORED = "sumo", "eidrive"
 """Prefixes of the names of its road users in the world, and of all other actors in SUMO."""
 LANE_CHANGE = 3.0
 """Duration of a lane change [s]; by default SUMO changes lanes in one step."""
+LARGEST = 1000.0
+"""Maximum plausible length, width and height of a road user [m]; the longest trains have this length."""
 BODIES = {
     "pedestrian": "pedestrian",
     "wheelchair": "pedestrian",
@@ -249,6 +251,8 @@ class SumoTraffic:
         bodies = () if category == "pedestrian" else library_bodies(category)
         body = next((body for body, own in bodies if own is role), _PEDESTRIAN)
         size = (users.getLength(user), users.getWidth(user), users.getHeight(user))
+        if not all(0.0 < measure <= LARGEST for measure in size):
+            raise SimulationError(f"SUMO: {user!r} has a size of {size} m (expected up to {LARGEST:g} m)")
         scale = size[0] / body.size[0]
         offset = (body.offset[0] * scale, 0.0, 0.5 * size[2])
         return replace(body, name=name, size=size, offset=offset, wheelbase=body.wheelbase * scale)
