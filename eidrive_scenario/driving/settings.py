@@ -257,10 +257,6 @@ def agent_settings(controller: Controller) -> AgentSettings:
             data[entry.name] = resolve_references(value, entry.scope, source=source, line=entry.line, path=entry.name)
         except SettingError as error:
             diagnostics += error.diagnostics
-    for name, kind in SELECTED.items():
-        also = (NO_PLANNER,) if name == "planner" else ()
-        if name in data and data[name] not in (*registry(kind), *also):
-            diagnostics.append(registry(kind).unknown(data[name], also=also, source=source, line=lines[name]))
     return parse_station_settings(
         data, source=source, line=controller.line, lines=lines, origins=origins, diagnostics=diagnostics
     )
@@ -281,6 +277,10 @@ def parse_station_settings(
     diagnostics and those of invalid settings.
     """
     errors = list(diagnostics)
+    for name, kind in SELECTED.items():
+        also, selected = (NO_PLANNER,) if name == "planner" else (), data.get(name)
+        if isinstance(selected, str) and selected not in (*registry(kind), *also):
+            errors.append(registry(kind).unknown(selected, also=also, source=source, line=lines.get(name, line)))
     station, planner_settings = split_planner_settings(
         data, AgentSettings.model_fields, source=source, line=line, lines=lines, origins=origins, diagnostics=errors
     )

@@ -71,6 +71,7 @@ class StackSettings(msgspec.Struct, frozen=True):
     channel          name of the channel profile
     channel_profile  content of the profile; None without a channel
     stations         settings of each station, by name
+    traffic_stations  share and settings of the stations of background traffic, of each command
     extensions       distributions of the third-party extensions in use, by `group.name`
     versions         versions of the libraries that compute the results of the stack, by name
     """
@@ -78,6 +79,7 @@ class StackSettings(msgspec.Struct, frozen=True):
     channel: str = NO_COOPERATION
     channel_profile: dict[str, Any] | None = None
     stations: Mapping[str, dict[str, Any]] = msgspec.field(default_factory=dict)
+    traffic_stations: Sequence[dict[str, Any]] = ()
     extensions: Mapping[str, str] = msgspec.field(default_factory=dict)
     versions: Mapping[str, str] = msgspec.field(default_factory=dict)
 
@@ -139,6 +141,15 @@ class DrivingStack(ABC):
         Raise SettingError if the profile is invalid.
         """
         return (Diagnostic("the driving stack has no channel", "remove the command", source, line),)
+
+    def request_traffic_stations(
+        self, content: str, *, source: str, line: int, scope: Scope | None = None
+    ) -> Iterable[Diagnostic]:
+        """Make a share of the vehicles of background traffic that enter from now on stations; return warnings about it.
+
+        Raise SettingError if the settings are invalid.
+        """
+        return (Diagnostic("the driving stack has no stations of traffic", "remove the command", source, line),)
 
     def metrics(self, now: float) -> Mapping[str, float]:
         """Return the metrics of the stack at the end of a run, at `now` [s]."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -13,7 +14,7 @@ from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNE
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import SELECTED, AgentSettings, agent_settings
 from eidrive_scenario.driving.stack import StackSettings
-from eidrive_scenario.errors import Diagnostic, ErrorSubject, SettingError, suggestion
+from eidrive_scenario.errors import Diagnostic, ErrorCollector, ErrorSubject, SettingError, suggestion
 from eidrive_scenario.extensions.registry import distributions, registry
 from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.openscenario import Scenario
@@ -25,6 +26,9 @@ from eidrive_scenario.sensing.sensor import sensor_class
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
 from eidrive_scenario.v2x.profile import ChannelProfile
 from eidrive_scenario.world.specs import actor_spec
+
+Located = Callable[..., tuple[str, int | None]]
+"""Returns file and line of the first of several settings that is given; else those of the station."""
 
 
 def declared_settings(
@@ -52,10 +56,10 @@ def declared_settings(
             controllers[name] = controller
     selections = EntitySelections(scenario)
     for name, settings in declared.items():
-        senders = _without_selections(settings.cooperates_with, selections, controllers)
-        if senders != settings.cooperates_with:
-            declared[name] = settings.model_copy(update={"cooperates_with": senders})
-        diagnostics.extend(_unknown_senders(name, declared[name], selections, controllers))
+        declared[name] = settings = with_senders(settings, selections, controllers)
+        others = [other for other in controllers if other != name]
+        located = partial(property_location, controllers[name])
+        diagnostics += unknown_senders(repr(name), settings, selections, others, located)
         if settings.planner not in (None, NO_PLANNER) and not _has_wheels(scenario, name):
             message = f"{name!r} has no wheels for planner {settings.planner!r}"
             line = property_line(controllers[name], "planner")
@@ -68,15 +72,22 @@ def declared_settings(
             diagnostics.append(Diagnostic(f"{what} {sender!r}", hint, "RunSettings.cooperate"))
     if diagnostics:
         raise SettingError(diagnostics)
-    updated = {}
-    for name, settings in declared.items():
-        update: dict[str, Any] = dict(selected)
-        # Settings of the file apply to the detector and the fusion method of the file
-        update |= {f"{part}_settings": {} for part, name in selected.items() if name != getattr(settings, part)}
-        if cooperate is not None and (settings.restricts_senders or _drives(scenario, name, settings)):
-            update["cooperates_with"] = cooperate
-        updated[name] = settings.model_copy(update=update)
-    return updated
+    return {
+        name: with_options(settings, selected, cooperate, drives=_drives(scenario, name, settings))
+        for name, settings in declared.items()
+    }
+
+
+def with_options(
+    settings: AgentSettings, selected: Mapping[str, str], cooperate: tuple[str, ...] | None, *, drives: bool
+) -> AgentSettings:
+    """Return the settings of a station with the options of `declared_settings` applied."""
+    update: dict[str, Any] = dict(selected)
+    # Settings of the file apply to the detector and the fusion method of the file
+    update |= {f"{part}_settings": {} for part, name in selected.items() if name != getattr(settings, part)}
+    if cooperate is not None and (settings.restricts_senders or drives):
+        update["cooperates_with"] = cooperate
+    return settings.model_copy(update=update)
 
 
 def possible_drivers(scenario: Scenario, settings: Mapping[str, AgentSettings]) -> list[str]:
@@ -118,54 +129,78 @@ def declared_detectors(
 
     Raise SettingError with all diagnostics of detectors, sensors, fusion methods and vehicle controllers.
     """
-    diagnostics: list[Diagnostic] = []
+    errors = ErrorCollector(SettingError)
     detectors: dict[str, Detector] = {}
     for name, station in settings.items():
-        subject = ErrorSubject(f"station {name!r}")
-        controller = station_controller(scenario, name)
-        source, line = _origin(controller, station, "detector", selected)
-        try:
-            detectors[name] = subject.call(build_detector, station, source=source, line=line)
-            weights = detectors[name].load_weights if load_weights else detectors[name].check_weights
-            subject.call(weights, allow_torchscript=allow_torchscript)
-            source, line = controller.source, property_line(controller, "sensors")
-            for sensor in station.rig_sensors(detectors[name].needs, detectors[name].default_sensors).values():
-                sensor_class(sensor.kind).check_settings(sensor)
-            source, line = _origin(controller, station, "fusion", selected)
-            subject.call(build_fusion, station, detectors[name], source=source, line=line)
-            source, line = (
-                controller.source,
-                property_line(controller, "vehicle_controller_settings", "vehicle_controller"),
+        located = partial(property_location, station_controller(scenario, name))
+        with errors:
+            detectors[name] = checked_detector(
+                station,
+                ErrorSubject(f"station {name!r}"),
+                located,
+                selected,
+                load_weights=load_weights,
+                allow_torchscript=allow_torchscript,
             )
-            selected_extension(station, "vehicle_controller", VehicleController, source=source, line=line)
-        except SettingError as error:
-            diagnostics += error.at(source, line).diagnostics
-    if diagnostics:
-        raise SettingError(list(dict.fromkeys(diagnostics)))
+    errors.raise_if_any()
     return detectors
+
+
+def checked_detector(
+    station: AgentSettings,
+    subject: ErrorSubject,
+    located: Located,
+    selected: Mapping[str, str],
+    *,
+    load_weights: bool,
+    allow_torchscript: bool,
+) -> Detector:
+    """Build the detector of a station as `declared_detectors`, and check its sensors and other extensions.
+
+    subject  station that errors of its extensions name
+
+    Raise SettingError with the location of the setting.
+    """
+
+    def origin(part: str) -> tuple[str, int | None]:
+        if part in selected and not getattr(station, f"{part}_settings"):  # only the option determines it
+            return f"RunSettings.{part}", None
+        return located(f"{part}_settings", part)
+
+    source, line = origin("detector")
+    try:
+        detector = subject.call(build_detector, station, source=source, line=line)
+        weights = detector.load_weights if load_weights else detector.check_weights
+        subject.call(weights, allow_torchscript=allow_torchscript)
+        source, line = located("sensors")
+        for sensor in station.rig_sensors(detector.needs, detector.default_sensors).values():
+            sensor_class(sensor.kind).check_settings(sensor)
+        source, line = origin("fusion")
+        subject.call(build_fusion, station, detector, source=source, line=line)
+        source, line = origin("vehicle_controller")
+        selected_extension(station, "vehicle_controller", VehicleController, source=source, line=line)
+    except SettingError as error:
+        raise error.at(source, line) from error
+    return detector
 
 
 def declared_encoders(scenario: Scenario, settings: Mapping[str, AgentSettings]) -> dict[str, Asn1Encoder]:
     """Build the encoder of every station with ASN.1 modules. Raise SettingError with the location of the property."""
     encoders = {}
-    folder = Path(scenario.path).parent if scenario.path is not None else Path()
     for name, station in settings.items():
         if station.asn1_files:
-            controller = station_controller(scenario, name)
-            files = [folder / file for file in station.asn1_files]
-            line = property_line(controller, "asn1_files")
             category = actor_spec(name, scenario.entities[name]).category
-            encoders[name] = Asn1Encoder(files, station.messages, station=category, source=controller.source, line=line)
+            located = partial(property_location, station_controller(scenario, name))
+            encoders[name] = build_encoder(station, scenario, category, located)
     return encoders
 
 
-def _origin(
-    controller: Controller, station: AgentSettings, part: str, selected: Mapping[str, str]
-) -> tuple[str, int | None]:
-    """Return file and line of a detector or fusion method, or its option if this and no property determines it."""
-    if part in selected and not getattr(station, f"{part}_settings"):
-        return f"RunSettings.{part}", None
-    return controller.source, property_line(controller, f"{part}_settings", part)
+def build_encoder(settings: AgentSettings, scenario: Scenario, category: str, located: Located) -> Asn1Encoder:
+    """Build the encoder of a station of this category from ASN.1 modules, relative to the scenario."""
+    folder = Path(scenario.path).parent if scenario.path is not None else Path()
+    source, line = located("asn1_files")
+    files = [folder / file for file in settings.asn1_files]
+    return Asn1Encoder(files, settings.messages, station=category, source=source, line=line)
 
 
 def station_controller(scenario: Scenario, name: str) -> Controller:
@@ -177,6 +212,18 @@ def property_line(controller: Controller, *properties: str) -> int:
     """Return the line of the first of these properties that a controller has; else that of the controller."""
     lines = {entry.name: entry.line for entry in property_entries(controller)}
     return next((lines[name] for name in properties if name in lines), controller.line)
+
+
+def property_location(controller: Controller, *properties: str) -> tuple[str, int | None]:
+    """Return the file and `property_line` of a controller."""
+    return controller.source, property_line(controller, *properties)
+
+
+def with_senders(settings: AgentSettings, selections: EntitySelections, stations: Container[str]) -> AgentSettings:
+    """Return settings whose senders are stations, without selections of them."""
+    senders = _without_selections(settings.cooperates_with, selections, stations)
+    unchanged = senders == settings.cooperates_with
+    return settings if unchanged else settings.model_copy(update={"cooperates_with": senders})
 
 
 def _without_selections(
@@ -198,20 +245,23 @@ def _sender_hint(sender: str, selections: EntitySelections, stations: Iterable[s
     return suggestion(sender, [*stations, *selections.declared])
 
 
-def _unknown_senders(
-    name: str, settings: AgentSettings, selections: EntitySelections, controllers: Mapping[str, Controller]
+def unknown_senders(
+    receiver: str,
+    settings: AgentSettings,
+    selections: EntitySelections,
+    stations: Collection[str],
+    located: Located,
 ) -> list[Diagnostic]:
-    line = property_line(controllers[name], "cooperates_with")
+    """Return an error for each sender of the settings that is none of these stations."""
     return [
         Diagnostic(
-            f"{name!r} cooperates with {sender!r}, which "
+            f"{receiver} cooperates with {sender!r}, which "
             + ("is a selection without stations" if sender in selections.declared else "is no station"),
-            _sender_hint(sender, selections, [other for other in controllers if other != name]),
-            controllers[name].source,
-            line,
+            _sender_hint(sender, selections, stations),
+            *located("cooperates_with"),
         )
         for sender in settings.cooperates_with or ()
-        if sender not in controllers
+        if sender not in stations
     ]
 
 
@@ -220,11 +270,17 @@ _WITH_SETTINGS = {"detector": Detector, "fusion": FusionMethod, "vehicle_control
 
 
 def resolved_stations(
-    settings: Mapping[str, AgentSettings], channel: str, profile: ChannelProfile | None
+    settings: Mapping[str, AgentSettings],
+    traffic: Sequence[tuple[float, AgentSettings]],
+    channel: str,
+    profile: ChannelProfile | None,
 ) -> StackSettings:
-    """Return the settings of stations and channel with the defaults of all extensions."""
+    """Return the settings of stations and channel with the defaults of all extensions.
+
+    traffic  share and settings of the stations of background traffic, of each command
+    """
     used = {("channels", profile.model)} if profile is not None else set()
-    for station in settings.values():
+    for station in (*settings.values(), *(station for _, station in traffic)):
         used |= {
             ("detectors", station.detector),
             ("fusion", station.fusion),
@@ -232,15 +288,19 @@ def resolved_stations(
             ("vehicle_controllers", station.vehicle_controller),
             ("trackers", station.tracker.kind if station.tracker is not None else ""),
         }
-    stations = {}
-    for name, station in sorted(settings.items()):
-        written = stations[name] = station.model_dump(mode="json")
-        for part, base in _WITH_SETTINGS.items():
-            for own in selected_extension(station, part, base)[1]:
-                written[f"{part}_settings"] = own.model_dump(mode="json")
     return StackSettings(
         channel=channel,
         channel_profile=None if profile is None else profile.model_dump(mode="json"),
-        stations=stations,
+        stations={name: _resolved(station) for name, station in sorted(settings.items())},
+        traffic_stations=[{"share": share, **_resolved(station)} for share, station in traffic],
         extensions=distributions(used),
     )
+
+
+def _resolved(station: AgentSettings) -> dict[str, Any]:
+    """Return the settings of a station with the defaults of its extensions."""
+    written = station.model_dump(mode="json")
+    for part, base in _WITH_SETTINGS.items():
+        for own in selected_extension(station, part, base)[1]:
+            written[f"{part}_settings"] = own.model_dump(mode="json")
+    return written

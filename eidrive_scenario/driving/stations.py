@@ -17,6 +17,7 @@ from eidrive_scenario.driving.control.vehicle_controller import ControlOverrides
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackInputs, StackSettings
 from eidrive_scenario.driving.station_declarations import (
+    build_encoder,
     declared_detectors,
     declared_encoders,
     declared_settings,
@@ -32,6 +33,8 @@ from eidrive_scenario.driving.station_warnings import (
     short_views,
 )
 from eidrive_scenario.driving.step import OWN_DECISIONS, AgentStep, StationPerception
+from eidrive_scenario.driving.traffic_stations import COMMAND as TRAFFIC_STATIONS
+from eidrive_scenario.driving.traffic_stations import TrafficStations, build_traffic_stations, parse_traffic_stations
 from eidrive_scenario.errors import Diagnostic, ErrorSubject, InvalidResult
 from eidrive_scenario.fusion.method import FusionMethod
 from eidrive_scenario.openscenario.values.parameters import Scope
@@ -40,6 +43,7 @@ from eidrive_scenario.perception.result_checks import describe
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.sensing.rig import Rig, read_all
 from eidrive_scenario.sensing.signals import SIGNAL_KINDS, SignalSensor
+from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
 from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.statistics.link_statistics import LinkStatistics
 from eidrive_scenario.world import World
@@ -141,7 +145,18 @@ class Stations(DrivingStack):
         self._overrides: dict[str, ControlOverrides] = {}
         scenario = context.scenario
         selected = {name: value for name in ("detector", "fusion") if (value := getattr(context, name)) is not None}
+        self._selected = selected
         self._settings = declared_settings(scenario, selected, context.cooperate)
+        self._traffic: TrafficStations | None = None
+        """Stations of background traffic that enters from now on."""
+        self._traffic_encoders: dict[str, Asn1Encoder] = {}
+        """Encoders of these stations by category."""
+        declared = [
+            self._built_traffic_stations(command.content, command.source, command.line, command.scope)
+            for command in scenario.custom_commands
+            if command.type == TRAFFIC_STATIONS
+        ]
+        self._declared_traffic = [stations for stations, _ in declared]
         # Detectors are built here to report unsuitable settings before the run.
         self._detectors = declared_detectors(
             scenario,
@@ -152,7 +167,7 @@ class Stations(DrivingStack):
         )
         self._library_versions = {
             name: version
-            for built in self._detectors.values()
+            for built in (*self._detectors.values(), *(detector for _, detector in declared))
             for name, version in sorted(built.library_versions.items())
         }
         """Versions of the libraries that compute the detections of any station, by name."""
@@ -199,7 +214,12 @@ class Stations(DrivingStack):
 
     def resolved_settings(self) -> StackSettings:
         return replace(
-            resolved_stations(self._settings, self._channel.name, self._channel.profile),
+            resolved_stations(
+                self._settings,
+                [(stations.share, stations.settings) for stations in self._declared_traffic],
+                self._channel.name,
+                self._channel.profile,
+            ),
             versions=self._library_versions,
         )
 
@@ -213,9 +233,11 @@ class Stations(DrivingStack):
             yield from short_channel_delay(self._channel.profile, context.dt, "RunSettings.channel")
 
     def add(self, spec: ActorSpec) -> None:
-        settings = self._settings.get(spec.name)
+        settings, encoder = self._settings.get(spec.name), self._encoders.get(spec.name)
         if settings is None:
-            return
+            if self._traffic is None or not self._is_equipped(spec, self._traffic):
+                return
+            settings, encoder = self._traffic.settings, self._traffic_encoder(spec.category, self._traffic)
         self._receivers.clear()
         context, station = self._context, ErrorSubject(f"station {spec.name!r}")
         self._rigs[spec.name] = station.call(build_rig, settings, spec, seed=context.seed)
@@ -230,7 +252,7 @@ class Stations(DrivingStack):
             seed=context.seed,
             dt=context.dt,
             detector=detector,
-            encoder=self._encoders.get(spec.name),
+            encoder=encoder,
             number=self._next_numbers.pop(spec.name, 0),
         )
         if agent.planner is not None:
@@ -257,6 +279,32 @@ class Stations(DrivingStack):
         self._channel.select(profile, origin=source, line=line, scope=scope)
         self._receivers.clear()
         return short_channel_delay(self._channel.profile, self._context.dt, source, line)
+
+    def request_traffic_stations(
+        self, content: str, *, source: str, line: int, scope: Scope | None = None
+    ) -> Iterator[Diagnostic]:
+        self._traffic, _ = self._built_traffic_stations(content, source, line, scope)
+        self._traffic_encoders.clear()
+        return iter(())
+
+    def _built_traffic_stations(
+        self, content: str, source: str, line: int | None, scope: Scope | None
+    ) -> tuple[TrafficStations, Detector]:
+        declared = parse_traffic_stations(content, source=source, line=line, scope=scope)
+        return build_traffic_stations(declared, self._context, self._selected, self._settings)
+
+    def _is_equipped(self, spec: ActorSpec, stations: TrafficStations) -> bool:
+        """Return whether an actor is a vehicle of background traffic and becomes one of these stations."""
+        is_declared = spec.name in self._context.scenario.entities
+        return not is_declared and spec.category != "pedestrian" and stations.includes(spec.name, self._context.seed)
+
+    def _traffic_encoder(self, category: str, stations: TrafficStations) -> Asn1Encoder | None:
+        if not stations.settings.asn1_files:
+            return None
+        if category not in self._traffic_encoders:
+            encoder = build_encoder(stations.settings, self._context.scenario, category, stations.located)
+            self._traffic_encoders[category] = encoder
+        return self._traffic_encoders[category]
 
     def perceive(self, world: World, view: WorldView, inputs: StackInputs) -> Mapping[str, StationPerception]:
         """Read all sensors, deliver messages, and let every agent perceive: once for each view."""

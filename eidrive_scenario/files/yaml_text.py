@@ -197,6 +197,19 @@ def key_lines(text: str, first: int = 1) -> dict[str, int]:
     return {path: first + line for path, line in _parse(text)[1].items()}
 
 
+def load_mapping(
+    text: str, name: str, hint: str, *, source: str, line: int | None
+) -> tuple[dict[Any, Any], dict[str, int]]:
+    """Return the mapping in the text of `name`, and the line of each key as `key_lines`.
+
+    Raise SettingError as `load_yaml`, or with this hint if the text is no mapping.
+    """
+    data, lines = _load(text, source, line, quote=True)
+    if not isinstance(data, dict):
+        raise SettingError(Diagnostic(f"{name} is {quoted(data)}", hint, source, line))
+    return data, {key: (line or 1) + below for key, below in lines.items()}
+
+
 def _parse(text: str) -> tuple[Any, dict[str, int]]:
     """Return the data of a text, and the line of each key, from 0."""
     if yaml.__with_libyaml__ and _COMMON.fullmatch(text):

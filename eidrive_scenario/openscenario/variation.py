@@ -18,7 +18,7 @@ from pydantic import Field, model_validator
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.errors import Diagnostic, ErrorCollector, SettingError, quoted, suggestion
 from eidrive_scenario.extensions.settings import Settings, parse_settings
-from eidrive_scenario.files.yaml_text import key_lines, load_yaml
+from eidrive_scenario.files.yaml_text import load_mapping
 from eidrive_scenario.openscenario.model import CustomCommandAction
 from eidrive_scenario.openscenario.scenario import Scenario
 from eidrive_scenario.openscenario.values.parameters import hide_parameters, parameter_hints, resolve_references
@@ -77,15 +77,15 @@ def variations(scenario: Scenario) -> Mapping[str, Distribution]:
 
 def _read_variations(scenario: Scenario) -> Mapping[str, Distribution]:
     errors = ErrorCollector()
-    specified: list[tuple[CustomCommandAction, dict[Any, Any]]] = []
+    specified: list[tuple[CustomCommandAction, dict[Any, Any], dict[str, int]]] = []
     for command in scenario.custom_commands:
         if command.type == COMMAND:
             with errors:
-                specified.append((command, _content(scenario, command)))
-    drawn = {str(name) for _, content in specified for name in content}
+                specified.append((command, *_content(scenario, command)))
+    drawn = {str(name) for _, content, _ in specified for name in content}
     distributions: dict[str, Distribution] = {}
-    for command, content in specified:
-        lines, scope = key_lines(command.content, command.line), hide_parameters(command.scope, drawn)
+    for command, content, lines in specified:
+        scope = hide_parameters(command.scope, drawn)
         for key, bounds in content.items():
             name, prefix = str(key), f"{key}."
             source, line = command.source, lines.get(name, command.line)
@@ -109,14 +109,14 @@ def _read_variations(scenario: Scenario) -> Mapping[str, Distribution]:
     return distributions
 
 
-def _content(scenario: Scenario, command: CustomCommandAction) -> dict[Any, Any]:
-    """Return the bounds of each parameter of a command. Raise SettingError if it is not a mapping or not in Init."""
+def _content(scenario: Scenario, command: CustomCommandAction) -> tuple[dict[Any, Any], dict[str, int]]:
+    """Return the bounds of each parameter of a command, and the lines of the keys.
+
+    Raise SettingError if it is not a mapping or not in Init.
+    """
     source, line = command.source, command.line
     initial = scenario.storyboard.init.actions.user_defined_action
     if not any(command is action.custom_command_action for action in initial):
         raise SettingError(Diagnostic(f"{COMMAND} has no effect in an event", "move it to Init", source, line))
-    data = load_yaml(command.content, source=source, line=line)
-    if not isinstance(data, dict):
-        hint = "write a mapping such as {EgoStart: {uniform: [-0.15, 0.15]}}"
-        raise SettingError(Diagnostic(f"{COMMAND} is {quoted(data)}", hint, source, line))
-    return data
+    hint = "write a mapping such as {EgoStart: {uniform: [-0.15, 0.15]}}"
+    return load_mapping(command.content, COMMAND, hint, source=source, line=line)

@@ -10,6 +10,8 @@ from pathlib import Path
 import msgspec
 
 from eidrive_scenario.driving.stack import DrivingStack, StackInputs
+from eidrive_scenario.driving.traffic_stations import COMMAND as TRAFFIC_STATIONS
+from eidrive_scenario.driving.traffic_stations import parse_traffic_stations
 from eidrive_scenario.errors import Diagnostic, ErrorCollector, ScenarioError, SettingError, quoted, suggestion
 from eidrive_scenario.evaluation.criteria_parser import (
     CRITERION,
@@ -65,6 +67,10 @@ def channel_profile(command: CustomCommandAction) -> ChannelProfile | None:
     return load_profile(command.content, origin=command.source, line=command.line, scope=command.scope)
 
 
+def _read_traffic_stations(command: CustomCommandAction) -> None:
+    parse_traffic_stations(command.content, source=command.source, line=command.line, scope=command.scope)
+
+
 def profile_files(scenario: Scenario) -> Iterator[Path]:
     """Yield the files of the channel profiles that a scenario selects."""
     for command in scenario.custom_commands:
@@ -86,6 +92,7 @@ def check_commands(scenario: Scenario) -> DeclaredCriteria:
 
     readers: Mapping[str, Callable[[CustomCommandAction], object]] = {
         CHANNEL: channel_profile,
+        TRAFFIC_STATIONS: _read_traffic_stations,
         CRITERION: read_criteria,
         VARIATION: lambda _: variations(scenario),
     }
@@ -240,9 +247,10 @@ def _execute_custom(command: CustomCommand, run: RunState) -> None:
         add_criteria(_declared_by(command, run), run)
         return
     run.record(command.type, command.content)
-    if command.type == CHANNEL:
+    requests = {CHANNEL: run.stack.request_channel, TRAFFIC_STATIONS: run.stack.request_traffic_stations}
+    if command.type in requests:
         scope, line = command.scope, command.line
-        warnings = run.stack.request_channel(command.content, source=command.source, line=line, scope=scope)
+        warnings = requests[command.type](command.content, source=command.source, line=line, scope=scope)
         run.warnings += map(str, warnings)
     elif command.type in EXITS:
         run.exit = exit_verdict(command, run.world.time)

@@ -43,6 +43,7 @@ class ResolvedSettings(RunSettings):
     later_channels   profiles that events of the scenario select, in the order of the file
     detector, planner, cooperate   the options that override the scenario; None if the scenario applies
     stations         settings of each station, by name: detector, its settings, cooperation, sensors and all others
+    traffic_stations  share and settings of the stations of background traffic, of each command in the order of the file
     weather          name of the preset that overrides the scenario; None if the scenario applies
     weather_profile  its content
     parameters       parameters of the scenario, with their final values
@@ -69,6 +70,7 @@ class ResolvedSettings(RunSettings):
     channel_profile: Mapping[str, Any] | None = None
     later_channels: tuple[Mapping[str, Any] | None, ...] = ()
     stations: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    traffic_stations: tuple[Mapping[str, Any], ...] = ()
     weather_profile: Mapping[str, Any] | None = None
     drawn: tuple[str, ...] = ()
     varied: tuple[str, ...] = ()
@@ -110,9 +112,9 @@ def resolve_settings(setup: RunSetup, seed: int, settings: RunSettings) -> Resol
     """Return all settings that determine a run, before its first tick."""
     scenario, weather, added = setup.scenario, setup.weather, setup.added_criteria
     resolved = setup.stack.resolved_settings()
-    profile, stations = resolved.channel_profile, dict(resolved.stations)
+    profile, stations, traffic = resolved.channel_profile, dict(resolved.stations), resolved.traffic_stations
     later = () if settings.channel is not None else tuple(_later_channels(scenario))
-    files = [*_scenario_files(scenario), *_setting_files((profile, *later, *stations.values()), scenario)]
+    files = [*_scenario_files(scenario), *_setting_files((profile, *later, *stations.values(), *traffic), scenario)]
     declared = [declaration for of_source in setup.declared_criteria.values() for declaration in of_source]
     models = distributions(
         [
@@ -136,6 +138,7 @@ def resolve_settings(setup: RunSetup, seed: int, settings: RunSettings) -> Resol
         channel_profile=_without_folders(profile),
         later_channels=tuple(_without_folders(channel) for channel in later),
         stations=_without_folders(stations),
+        traffic_stations=tuple(map(_without_folders, traffic)),
         weather_profile=_without_folders(_dump(weather)),
         drawn=_drawn(scenario, seed, settings),
         files=tuple(dict.fromkeys(files)),

@@ -11,6 +11,7 @@ import importlib.util
 import math
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -24,7 +25,7 @@ from eidrive_scenario.errors import InputError, SimulationError
 from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.simulation import Simulation
+from eidrive_scenario.simulation import RunSettings, Simulation
 
 DATA = Path(__file__).parents[1] / "data"
 OFFSET = 80.0, 120.25
@@ -153,6 +154,23 @@ def test_runs_repeat_and_end_sumo(crossing: Callable[..., RecordedRun]) -> None:
     first, second, other = (crossing(random, seed=seed).result.trace_hash for seed in (3, 3, 4))
     assert first == second
     assert first != other
+
+
+@needs_sumo
+def test_vehicles_of_sumo_can_be_stations(crossing: Callable[..., RecordedRun]) -> None:
+    """From 2.5 s on there are four vehicles, each of which sends 10 messages per second."""
+    equipped = '<CustomCommandAction type="eidrive.traffic_stations">{share: 1, message_rate: 10}</CustomCommandAction>'
+    stated = f"{command()}<UserDefinedAction>{equipped}</UserDefinedAction>"
+    drive = {"Ego": "{target_speed: 0, planner: route}"}
+    played = crossing(MIXED, 5.0, init=stated, settings=RunSettings(channel="ideal", drive=drive))
+    received = Counter(
+        message.message.sender
+        for frame in played.frames
+        if frame.view.time >= 3.0
+        for message in frame.steps["Ego"].inbox
+    )
+    assert set(received) == {f"sumo.{name}" for name in ("east", "north", "left", "right")}
+    assert all(19 <= count <= 21 for count in received.values())
 
 
 @needs_sumo

@@ -18,7 +18,7 @@ from eidrive_scenario.extensions.settings import Settings, parse_settings
 from eidrive_scenario.files.bounded import MIB, read_regular_file, reason_of
 from eidrive_scenario.files.encodable import printable
 from eidrive_scenario.files.untrusted_xml import XmlLimits, line_of, parse_untrusted
-from eidrive_scenario.files.yaml_text import key_lines, load_yaml
+from eidrive_scenario.files.yaml_text import load_mapping
 from eidrive_scenario.openscenario.model import CustomCommandAction
 from eidrive_scenario.openscenario.values.parameters import resolve_references
 from eidrive_scenario.roads import RoadNetwork
@@ -62,11 +62,8 @@ class SumoFiles:
 def sumo_files(command: CustomCommandAction, roads: RoadNetwork) -> SumoFiles:
     """Return the files that a command `eidrive.sumo` states. Raise SettingError with all diagnostics."""
     source, line = command.source, command.line
-    lines = key_lines(command.content, 1 if line is None else line)
-    data = load_yaml(command.content, source=source, line=line)
-    if not isinstance(data, dict):
-        hint = "write {network: town.net.xml, routes: [town.rou.xml]}"
-        raise SettingError(Diagnostic(f"{COMMAND}: no mapping of settings", hint, source, line))
+    hint = "write {network: town.net.xml, routes: [town.rou.xml]}"
+    data, lines = load_mapping(command.content, COMMAND, hint, source=source, line=line)
     data = resolve_references(data, command.scope, source=source, line=line, lines=lines)
     settings = parse_settings(SumoSettings, data, source=source, line=line, lines=lines)
     folder = Path(source).parent
