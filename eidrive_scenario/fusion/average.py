@@ -21,7 +21,8 @@ GATE = 4.0
 class AverageFusion(FusionMethod):
     """Fusion by averaging. Stations are processed in order of their names, and boxes are assigned within the gate.
 
-    Boxes of one station are never fused, because they are different objects. Classes are not compared, because
+    Boxes of one station are never fused, because they are different objects; nor are those of senders that report
+    themselves, which are processed first. Classes are not compared, because
     detectors confuse them. Position, size and score are means, and yaw is a circular mean. Velocity is the mean of the
     known values, and the class is the most frequent one. The covariance is the mean of the known ones, an upper bound
     for any correlation of the errors. The existence probability is that of at least one correct report.
@@ -30,7 +31,7 @@ class AverageFusion(FusionMethod):
     is_finite_by_construction: ClassVar[bool] = True
 
     def fuse(self, reports: Sequence[Report], now: float) -> Detections:
-        ordered = sorted(reports, key=lambda report: report.station) if len(reports) > 1 else reports
+        ordered = sorted(reports, key=_order_of) if len(reports) > 1 else reports
         present = [report.detections for report in ordered if len(report.detections)]
         if not present:
             return Detections(now)
@@ -39,7 +40,8 @@ class AverageFusion(FusionMethod):
             if only.time == now:
                 return only
             return replace(only, time=now)
-        labels = _label_objects(present)
+        senders = sum(report.describes_sender for report in ordered if len(report.detections))
+        labels = _label_objects(present, senders)
         fused = fuse_average(present, labels, now)
         if all([report.existence is NOT_ESTIMATED for report in present]):
             return fused
@@ -50,14 +52,24 @@ class AverageFusion(FusionMethod):
         return replace(fused, existence=1.0 - absence)
 
 
-def _label_objects(reports: Sequence[Detections]) -> list[int]:
-    """Return the object of each box, over all boxes of all reports; objects are numbered in order of appearance."""
+def _order_of(report: Report) -> tuple[bool, str]:
+    """Return the place of a report in the order of processing."""
+    return not report.describes_sender, report.station
+
+
+def _label_objects(reports: Sequence[Detections], senders: int) -> list[int]:
+    """Return the object of each box, over all boxes of all reports; objects are numbered in order of appearance.
+
+    senders  number of reports of senders about themselves, which are the first ones
+    """
     # Single numbers: for the few objects of a station, arrays take longer.
     means: list[list[float]] = reports[0].boxes[:, :3].tolist()
     counts, labels = [1] * len(means), list(range(len(means)))
-    for report in reports[1:]:
+    for number, report in enumerate(reports[1:], 1):
         centers = report.boxes[:, :3]
-        associated = {box: label for label, box in associate(np.array(means), centers, GATE)}
+        associated: dict[int, int] = {}
+        if number >= senders:
+            associated = {box: label for label, box in associate(np.array(means), centers, GATE)}
         for box, center in enumerate(centers.tolist()):
             label = associated.get(box, len(means))
             if label == len(means):

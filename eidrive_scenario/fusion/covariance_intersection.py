@@ -49,6 +49,7 @@ class CovarianceIntersectionFusion(FusionMethod):
     correlation of errors between stations is unknown: they share motion models, maps, and views of an object.
     Covariance intersection is consistent for any correlation, and so avoids data incest. Stations are processed in
     order of their names; each object has at most one track per station, because a station reports different objects.
+    For the same reason the reports of senders about themselves count as one station, which is the first.
     Existence probabilities of stations are independent, because stations report only detections of their sensors: an
     object exists if at least one report is correct, 1 - prod (1 - r).
     """
@@ -60,8 +61,8 @@ class CovarianceIntersectionFusion(FusionMethod):
         self._gate = AssociationGate.of(self.settings.gate, self.settings.gate_distance)
         self._history = ReportHistory(self.settings.max_age, self._gate)
         self._aligner = PoseAligner(self._history) if self.settings.align_poses else None
-        self._order: tuple[tuple[str, ...], tuple[str, ...]] = (), ()
-        """Stations of the last reports, and the same in order of their names."""
+        self._order: tuple[tuple[str, ...], tuple[str, ...], int] = (), (), 0
+        """Stations of the last reports, the same in their order, and the number of those that report themselves."""
 
     @property
     def max_report_age(self) -> float:
@@ -97,8 +98,10 @@ class CovarianceIntersectionFusion(FusionMethod):
         stations."""
         names = tuple([report.station for report in reports])
         if names != self._order[0]:
-            self._order = names, tuple(sorted(set(names)))
-        return self._history.select(self._order[1])
+            senders = {report.station for report in reports if report.describes_sender}
+            self._order = names, (*sorted(senders), *sorted(set(names) - senders)), len(senders)
+        rows, ranks = self._history.select(self._order[1])
+        return rows, np.maximum(ranks - (self._order[2] - 1), 0) if self._order[2] else ranks
 
 
 def _fuse_batch(

@@ -16,6 +16,9 @@ from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.v2x.messages.message import Payload, StationState
 
+SENDER_REPORT_SUFFIX = " itself"
+"""Suffix of the station of reports of a sender about itself, which are kept as those of another station."""
+
 
 class Report(msgspec.Struct, frozen=True, gc=False):
     """Detections of one station, measured at `detections.time` and received at `arrived` [s].
@@ -32,6 +35,11 @@ class Report(msgspec.Struct, frozen=True, gc=False):
     state: StationState | None = None
     complete: bool = True
     pose_change: Array | None = None
+
+    @property
+    def describes_sender(self) -> bool:
+        """Whether the sender reports itself. Objects of two such reports are different bodies."""
+        return self.station.endswith(SENDER_REPORT_SUFFIX)
 
 
 class FusionMethod(ABC):

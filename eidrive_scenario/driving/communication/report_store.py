@@ -18,7 +18,7 @@ from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.communication.own_body import OwnBody
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InvalidResult
-from eidrive_scenario.fusion.method import FusionMethod, Report
+from eidrive_scenario.fusion.method import SENDER_REPORT_SUFFIX, FusionMethod, Report
 from eidrive_scenario.perception.lidar.station import StationLidars
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.result_checks import describe
@@ -205,10 +205,6 @@ class SensorDataSharing:
         if not isinstance(merged, Readings):
             raise InvalidResult(self._fusion, "merge_readings", f"returned {describe(merged)} (expected Readings)")
         return self._joint.perceive(merged)
-
-
-SENDER_REPORT_SUFFIX = " itself"
-"""Suffix of the reports of a station about itself, which are kept as those of another station."""
 
 
 class ReportStore:

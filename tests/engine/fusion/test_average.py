@@ -91,6 +91,14 @@ def test_average_keeps_close_cars_of_one_station_separate() -> None:
     assert len(fuse(report("A", (10, 0), (10, 2.5)))) == 2
 
 
+def test_average_keeps_senders_that_report_themselves_separate() -> None:
+    senders = report("A itself", (10, 0)), report("B itself", (10, 3.0))
+    for reports in (senders, senders[::-1]):
+        assert fuse(*reports).boxes[:, 1].tolist() == [0.0, 3.0]
+    seen = fuse(*senders, report("C", (10, 0.2), (10, 3.2)))
+    np.testing.assert_allclose(seen.boxes[:, 1], [0.1, 3.1])
+
+
 def test_associate_minimizes_total_distance_of_the_maximum_assignment() -> None:
     """The nearest pair is not assigned, because the other boxes would then be outside the gate."""
     pairs = associate(
