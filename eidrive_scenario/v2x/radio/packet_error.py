@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 
@@ -80,6 +80,14 @@ _CODED_STEP_DB = 0.25
 """Distance of the points of curves of coded modulation [dB]."""
 
 
+@cache
+def _quadrature() -> tuple[Array, Array]:
+    """Return nodes and weights of Gauss and Hermite."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(64)
+    return nodes, weights / weights.sum()
+
+
+@lru_cache(maxsize=4096)  # curves for other sizes of packets have the same ratios
 def _capacity(ratio: float, order: int) -> tuple[float, float]:
     """Return mean and variance of the information density of square QAM in white noise, in bits per symbol.
 
@@ -88,12 +96,12 @@ def _capacity(ratio: float, order: int) -> tuple[float, float]:
     levels = np.arange(1 - 2 ** (order // 2), 2 ** (order // 2), 2).astype(float)
     levels *= math.sqrt(0.5 / np.mean(levels**2))
     deviation = math.sqrt(0.5 / ratio)
-    nodes, weights = np.polynomial.hermite_e.hermegauss(64)
+    nodes, weights = _quadrature()
     noise = deviation * nodes
     apart = levels[:, None, None] - levels[None, :, None] + noise
     exponents = (noise**2 - apart**2) / (2.0 * deviation**2)
     density = order / 2.0 - np.log2(np.exp(exponents).sum(axis=1))
-    share = weights / weights.sum() / len(levels)
+    share = weights / len(levels)
     mean = float((density * share).sum())
     return 2.0 * mean, 2.0 * float((density**2 * share).sum() - mean**2)
 
