@@ -1,4 +1,4 @@
-"""Runs of all third-party scenarios to their stop trigger, their end or the time limit."""
+"""Runs of third-party scenarios to their stop trigger, their end or the time limit."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from corpora import corpora_folder, corpora_name, needs_corpora, scenario_files
+from corpora import CORPORA, corpora_folder, corpora_name, needs_corpora, scenario_files
 from lxml import etree
-from reference_traces import END
+from reference_traces import END, comparable, source_of
 
 from eidrive_scenario.errors import ScenarioError
 from eidrive_scenario.openscenario import load_scenario
@@ -36,6 +36,11 @@ def scenarios() -> list[str]:
     return found or ["none"]
 
 
+def compared() -> set[str]:
+    """Return the files whose runs `test_reference_agreement` compares with those of esmini."""
+    return {corpora_name(source_of(CORPORA, name)) for name in comparable(CORPORA)} if CORPORA else set()
+
+
 class PresenceObserver:
     """Observer of the actors of a run and of the validity of their positions."""
 
@@ -60,7 +65,7 @@ def maps(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.exhaustive
 @pytest.mark.timeout(120)
-@pytest.mark.parametrize("name", [name for name in scenarios() if name not in BROKEN])
+@pytest.mark.parametrize("name", sorted({*scenarios()} - {*BROKEN} - compared()))
 @pytest.mark.filterwarnings("default")
 def test_corpora_scenario_runs_to_its_end(name: str, record_property: Callable[[str, object], None]) -> None:
     scenario, watch = load_scenario(corpora_folder() / name), PresenceObserver()

@@ -18,14 +18,15 @@ from eidrive_scenario.extensions.library import describe_scenarios, library_path
 from eidrive_scenario.recording.frame import Frame
 
 EGO = "Ego"
+STATION = 'name="module" value="eidrive"'
 WITHOUT_DRIVER = ("coop/scenario_3", "coop/scenario_4")
-WITH_STATIONS = ("coop", "corner_cases", "ei", "ncap")
 CASES = [
     (entry.name, channel)
     for entry in describe_scenarios()
     if entry.name not in WITHOUT_DRIVER
-    for channel in (("none", "ideal") if entry.family in WITH_STATIONS else ("none",))
+    for channel in ("none", "ideal")[: (library_path() / f"{entry.name}.xosc").read_text().count(STATION)]
 ]
+"""Scenarios and channels; with a single station the channel has no effect."""
 CAUTIOUS = ("ncap/crossing_car", "coop/scenario_1", "coop/scenario_2")
 """Scenarios that are also run with caution before hidden lanes."""
 PARAMETERS = {"corner_cases/wrong_clock": {"ClockOffset": "0"}}

@@ -32,7 +32,7 @@ def test_behavior_arrives_without_collision_by_own_fault(scene: str) -> None:
 @pytest.mark.parametrize("scene", [scene for scene in SCENES if scene != "parked_cars"])
 def test_lane_follower_collides(scene: str) -> None:
     """Each scene contains a conflict: without a reaction there is a contact. Beside parked cars none is needed."""
-    contact = {"collision": {"of": "Ego", "name": "contact"}}
+    contact = {"collision": {"of": "Ego", "name": "contact", "fatal": True}}
     settings = RunSettings(parameters={"Planner": "route"}, criteria=contact)
     result = run_file(f"driving/{scene}", seed=1, settings=settings)
     assert result.metrics["contact.count"] > 0.0
