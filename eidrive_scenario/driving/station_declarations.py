@@ -57,9 +57,8 @@ def declared_settings(
     selections = EntitySelections(scenario)
     for name, settings in declared.items():
         declared[name] = settings = with_senders(settings, selections, controllers)
-        others = [other for other in controllers if other != name]
         located = partial(property_location, controllers[name])
-        diagnostics += unknown_senders(repr(name), settings, selections, others, located)
+        diagnostics += unknown_senders(name, settings, selections, controllers, located)
         if settings.planner not in (None, NO_PLANNER) and not _has_wheels(scenario, name):
             message = f"{name!r} has no wheels for planner {settings.planner!r}"
             line = property_line(controllers[name], "planner")
@@ -246,18 +245,21 @@ def _sender_hint(sender: str, selections: EntitySelections, stations: Iterable[s
 
 
 def unknown_senders(
-    receiver: str,
+    name: str,
     settings: AgentSettings,
     selections: EntitySelections,
     stations: Collection[str],
     located: Located,
 ) -> list[Diagnostic]:
-    """Return an error for each sender of the settings that is none of these stations."""
+    """Return an error for each sender of the settings that is none of these stations.
+
+    name  of the receiving station, or of the command that declares it
+    """
     return [
         Diagnostic(
-            f"{receiver} cooperates with {sender!r}, which "
+            f"{name!r} cooperates with {sender!r}, which "
             + ("is a selection without stations" if sender in selections.declared else "is no station"),
-            _sender_hint(sender, selections, stations),
+            _sender_hint(sender, selections, [other for other in stations if other != name]),
             *located("cooperates_with"),
         )
         for sender in settings.cooperates_with or ()
