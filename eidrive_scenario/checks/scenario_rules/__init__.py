@@ -50,6 +50,7 @@ RULES: tuple[Rule[LintContext], ...] = (
     Rule("zero-rate-transition", Level.NOTE, "a transition with the rate 0", actions.zero_rate_transitions),
     Rule("untimed-trajectory", Level.WARNING, "a trajectory with missing or equal times", actions.untimed_trajectories),
     Rule("unknown-traffic", Level.WARNING, "a stop of traffic that no action starts", entities.unknown_traffic),
+    Rule("traffic-stack", Level.WARNING, "a driving stack of background traffic", entities.traffic_with_stacks),
     Rule("unconnected-trailer", Level.WARNING, "a trailer without hitch or coupler", entities.unconnected_trailers),
     Rule(
         "ineffective-parameter-action",

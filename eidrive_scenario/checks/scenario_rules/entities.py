@@ -7,8 +7,10 @@ from collections.abc import Iterator
 from eidrive_scenario.checks.rule import at
 from eidrive_scenario.checks.scenario_rules.context import LintContext
 from eidrive_scenario.checks.scenario_rules.outline import Node
+from eidrive_scenario.driving.traffic_stations import COMMAND as TRAFFIC_STATIONS
 from eidrive_scenario.errors import Diagnostic, suggestion
 from eidrive_scenario.openscenario import model
+from eidrive_scenario.openscenario.conventions import is_agent_controller
 from eidrive_scenario.openscenario.validation.names import scenario_objects
 
 
@@ -117,6 +119,24 @@ def unknown_traffic(context: LintContext) -> Iterator[Diagnostic]:
     for action, name in named:
         if action.traffic_stop_action is not None and name not in started:
             yield at(action, f"TrafficStopAction: no traffic action is named {name!r}", suggestion(name, started))
+
+
+def traffic_with_stacks(context: LintContext) -> Iterator[Diagnostic]:
+    """Yield driving stacks of background traffic, which have no effect."""
+    holders: list[model.ControllerDistributionEntry | model.ObjectController]
+    holders = [*context.of(model.ControllerDistributionEntry)]
+    for template in context.of(model.ScenarioObjectTemplate):
+        holders += template.object_controller
+    for holder in holders:
+        controller: model.Element | None = holder.controller
+        if holder.catalog_reference is not None:
+            controller = context.scenario.resolved(holder.catalog_reference)
+        if isinstance(controller, model.Controller) and is_agent_controller(controller):
+            yield at(
+                holder,
+                f"driving stack {controller.name!r} has no effect: background traffic drives by itself",
+                f"make a share of its vehicles stations by the command {TRAFFIC_STATIONS}",
+            )
 
 
 def unconnected_trailers(context: LintContext) -> Iterator[Diagnostic]:
