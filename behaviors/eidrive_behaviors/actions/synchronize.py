@@ -76,6 +76,9 @@ class SynchronizeAction(ActionBehaviour):
         """Trajectories along which the distances of both were measured last."""
         self._targets: dict[str, tuple[TrajectoryCurve, bool]] = {}
         """Per entity: its trajectory, and whether its target is a TrajectoryPosition on that trajectory."""
+        targets = self.action.target_position, self.action.target_position_master
+        self._moving = tuple(bool(referenced_entities(target)) for target in targets)
+        """Whether each target moves with an entity."""
         self._sense: float | None = None
         """-1 if the actor drives backwards, else +1; None before the first step."""
         self._mean: float | None = None
@@ -103,10 +106,7 @@ class SynchronizeAction(ActionBehaviour):
         )
         changed, self._measured = measured != self._measured, measured
         before, self._last = None if changed else self._last, (way, master_way)
-        moves, master_moves = (
-            bool(referenced_entities(target))
-            for target in (self.action.target_position, self.action.target_position_master)
-        )
+        moves, master_moves = self._moving
         if (moves or master_moves) and (before is None or dt == 0.0):
             return Status.RUNNING  # Their speeds are known from the second step on.
         ahead = sense * motion.speed + (way - before[0]) / dt if moves and before is not None else 0.0
