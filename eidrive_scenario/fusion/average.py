@@ -22,10 +22,10 @@ class AverageFusion(FusionMethod):
     """Fusion by averaging. Stations are processed in order of their names, and boxes are assigned within the gate.
 
     Boxes of one station are never fused, because they are different objects; nor are those of senders that report
-    themselves, which are processed first. Classes are not compared, because
-    detectors confuse them. Position, size and score are means, and yaw is a circular mean. Velocity is the mean of the
-    known values, and the class is the most frequent one. The covariance is the mean of the known ones, an upper bound
-    for any correlation of the errors. The existence probability is that of at least one correct report.
+    themselves, which are processed first. Classes are not compared, because detectors confuse them. Position, size and
+    score are means, and yaw is a circular mean. Velocity is the mean of the known values, and the class is the most
+    frequent one. The covariance is the mean of the known ones, an upper bound for any correlation of the errors. The
+    existence probability is that of at least one correct report.
     """
 
     is_finite_by_construction: ClassVar[bool] = True

@@ -337,7 +337,7 @@ def test_filtering_all_scans_keeps_the_order_of_scores() -> None:
     With existence that accumulates over its scans, wrong boxes that persist are as likely as right ones: 0.15.
     """
     arms = [Condition("none"), Condition("covariance_intersection")]
-    settings = RunSettings(detector="pillars", time_limit=4.0)
+    settings = RunSettings(detector="pillars", time_limit=8.0)
     record = run_trial("coop/scenario_4", 1, settings, "Ego", arms)[1].record()
     alone, fused = (Pool([record], arm.name, 2).precision(2).value for arm in arms)
     assert fused > alone + 0.2

@@ -33,7 +33,7 @@ PARAMETERS = {"corner_cases/wrong_clock": {"ClockOffset": "0"}}
 """Parameters by scenario: a wrong clock moves reported actors by more than `NEAR`, so that they count as unknown."""
 START = 20
 """Number of ticks after which actors count as hidden; the first messages arrive before."""
-LONGEST = 6.0
+LONGEST = 8.0
 """Maximum simulated time [s]."""
 SHIFT = 0.6
 """Distance by which a hidden actor is moved [m]."""
