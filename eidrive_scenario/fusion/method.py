@@ -16,9 +16,6 @@ from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.sensing.readings import Readings
 from eidrive_scenario.v2x.messages.message import Payload, StationState
 
-SENDER_REPORT_SUFFIX = " itself"
-"""Suffix of the station of reports of a sender about itself, which are kept as those of another station."""
-
 
 class Report(msgspec.Struct, frozen=True, gc=False):
     """Detections of one station, measured at `detections.time` and received at `arrived` [s].
@@ -27,6 +24,7 @@ class Report(msgspec.Struct, frozen=True, gc=False):
     pose_change  covariance (3, 3) of the change of the error of x, y [m] and yaw [rad] of the station since its last
               report, of which positions relative to its assumed pose are a sum; None: its detections have no such error
     complete  whether the list contains all detected objects; if False, objects that are not listed stay unchanged
+    describes_sender  whether the sender reports itself; objects of two such reports are different bodies
     """
 
     station: str
@@ -35,11 +33,7 @@ class Report(msgspec.Struct, frozen=True, gc=False):
     state: StationState | None = None
     complete: bool = True
     pose_change: Array | None = None
-
-    @property
-    def describes_sender(self) -> bool:
-        """Whether the sender reports itself. Objects of two such reports are different bodies."""
-        return self.station.endswith(SENDER_REPORT_SUFFIX)
+    describes_sender: bool = False
 
 
 class FusionMethod(ABC):

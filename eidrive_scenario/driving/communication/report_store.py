@@ -18,7 +18,7 @@ from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.communication.own_body import OwnBody
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InvalidResult
-from eidrive_scenario.fusion.method import SENDER_REPORT_SUFFIX, FusionMethod, Report
+from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.perception.lidar.station import StationLidars
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.result_checks import describe
@@ -207,6 +207,10 @@ class SensorDataSharing:
         return self._joint.perceive(merged)
 
 
+SENDER_REPORT_SUFFIX = " itself"
+"""Suffix of the station of reports of a sender about itself, which are kept as those of another station."""
+
+
 class ReportStore:
     """Newest report of each station until the end of its lifetime. Every report is passed to the fusion method, except
     those that are too old when they arrive.
@@ -302,7 +306,8 @@ class ReportStore:
                 if sender not in self._partial:
                     self._partial[sender] = PartialReportAssembler(self._lifetime)
                 completed = self._partial[sender].update(message.objects, detections)
-            self.add(Report(station, detections, received.arrived, state, complete, pose_change), completed)
+            report = Report(station, detections, received.arrived, state, complete, pose_change, not perceived)
+            self.add(report, completed)
         if now > self._next_deletion:
             ends = {station: self._end_of_life(held) for station, held in self._reports.items()}
             for station, end in ends.items():

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from eidrive_scenario.base.assignment import associate
 from eidrive_scenario.base.detections import Detections
@@ -92,7 +93,10 @@ def test_average_keeps_close_cars_of_one_station_separate() -> None:
 
 
 def test_average_keeps_senders_that_report_themselves_separate() -> None:
-    senders = report("A itself", (10, 0)), report("B itself", (10, 3.0))
+    senders = [
+        replace(report("A", (10, 0)), describes_sender=True),
+        replace(report("B", (10, 3)), describes_sender=True),
+    ]
     for reports in (senders, senders[::-1]):
         assert fuse(*reports).boxes[:, 1].tolist() == [0.0, 3.0]
     seen = fuse(*senders, report("C", (10, 0.2), (10, 3.2)))

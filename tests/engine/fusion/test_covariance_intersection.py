@@ -72,12 +72,12 @@ def test_fuse_keeps_distant_cars_separate(report: Make, fuse: Fuse) -> None:
 def test_fuse_keeps_senders_that_report_themselves_separate(observed: bool, report: Make, fuse: Fuse) -> None:
     """Two cars in neighboring lanes, whose reports are 1.5 s old, are within the gate; a third station sees both."""
     places = {"A": (10.0, 0.0), "B": (10.5, 3.0)}
-    reports = [report(f"{name} itself", 0.0, [place], velocity=(0.0, 0.0)) for name, place in places.items()]
+    unnamed = [report(name, 0.0, [place], velocity=(0.0, 0.0)) for name, place in places.items()]
+    reports = [replace(one, describes_sender=True) for one in unnamed]
     reports += [report("C", 1.5, list(places.values()), velocity=(0.0, 0.0))] * observed
     for order in (reports, reports[::-1]):
         fused = fuse(order, 1.5)
         np.testing.assert_allclose(sorted(fused.boxes[:, :2].tolist()), sorted(places.values()), atol=1e-6)
-    unnamed = [report(name, 0.0, [place], velocity=(0.0, 0.0)) for name, place in places.items()]
     assert len(fuse(unnamed, 1.5)) == 1
 
 
