@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.geometry import footprint, wrap_angle
-from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads import LaneLocations, RoadNetwork
 from eidrive_scenario.world.road_objects import solid_boxes
 
 CELL = 0.5
@@ -102,12 +102,15 @@ class MapContext:
         near = self.near_road(corners.reshape(-1, 2)).reshape(corners.shape[:2]).any(axis=1)
         return boxes[near & ~self.on_lane(boxes[:, :2])]
 
-    def lane_heading(self, plan: Array) -> Array:
-        """Return the driving direction (N,) at points (N, 2) [rad]; NaN off the roads and in junctions."""
+    def lane_heading(self, plan: Array, near: Array) -> Array:
+        """Return the driving direction (N,) at points (N, 2) [rad]; NaN off the roads and in junctions.
+
+        near  heights (N,) next to which the roads are, if several are above each other [m]
+        """
         headings = np.full(len(plan), np.nan)
         if self._roads is None or not len(plan):
             return headings
-        located = self._roads.locate(plan[:, 0], plan[:, 1])
+        located = self._locate(self._roads, plan, near)
         for point in np.flatnonzero((located.road >= 0) & (located.outside <= 0.0) & (located.lane != 0)).tolist():
             road, lane = located.roads[int(located.road[point])], int(located.lane[point])
             if self._roads.roads[road].junction_id is not None:
@@ -126,20 +129,31 @@ class MapContext:
 
     def facing(self, boxes: Array) -> Array:
         """Return headings (N,) of boxes (N, 7) [rad], reversed if their lane clearly has the opposite direction."""
-        lane = self.lane_heading(boxes[:, :2])
+        lane = self.lane_heading(boxes[:, :2], boxes[:, 2] - boxes[:, 5] / 2.0)
         against = np.cos(boxes[:, 6] - np.nan_to_num(lane)) < -math.cos(math.pi / 4)
         return np.where(np.isfinite(lane) & against, wrap_angle(boxes[:, 6] + math.pi), boxes[:, 6])
 
     def ground(self, plan: Array, otherwise: float, near: Array | None = None) -> Array:
         """Return the height (N,) of the road below points (N, 2) [m]; `otherwise` off the roads and without a map.
 
-        near  heights (N,) next to which the roads are, if several are above each other [m]
+        near  heights (N,) next to which the roads are, if several are above each other [m]; None: `otherwise`
         """
         height = np.full(len(plan), otherwise)
         if self._roads is None or self._level or not len(plan):
             return height
-        located = self._roads.locate(plan[:, 0], plan[:, 1], near)
+        located = self._locate(self._roads, plan, height if near is None else near)
         for point in np.flatnonzero((located.road >= 0) & (located.outside <= 5.0)).tolist():
             road = located.roads[int(located.road[point])]
             height[point] = self._roads.road_pose_at(road, float(located.s[point]), float(located.t[point])).z
         return height
+
+    def _locate(self, roads: RoadNetwork, plan: Array, near: Array) -> LaneLocations:
+        """Return locations of points (N, 2), on the road next to the heights (N,) where several are above each other.
+
+        Beside the roads heights would select a road farther away: that of a slope, for points that are assumed level.
+        """
+        located = roads.locate(plan[:, 0], plan[:, 1], None if self._level else near)
+        beside = np.flatnonzero(located.outside > 0.0)
+        if beside.size and not self._level:
+            located.insert(roads.locate(plan[beside, 0], plan[beside, 1]), beside)
+        return located

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.base.arrays import Integers
+from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.base.geometry import overlap
 from eidrive_scenario.perception.geometry.map_context import MapContext
 from eidrive_scenario.perception.geometry.size_priors import PRIORS
@@ -92,9 +92,9 @@ def _obstacles(scan: Scan, surroundings: MapContext, candidates: list[FittedObje
     """Return those of the objects that stand on lanes for vehicles."""
     if not candidates or not surroundings.has_map:
         return []
-    centers = scan.frame.to_world(np.array([scan.points[candidate.rows, :2].mean(axis=0) for candidate in candidates]))
-    on_lane = surroundings.on_lane(centers).tolist()
-    headings = surroundings.lane_heading(centers) - scan.frame.yaw
+    centers = _centers(scan, [candidate.rows for candidate in candidates])
+    on_lane = surroundings.on_lane(centers[:, :2]).tolist()
+    headings = surroundings.lane_heading(centers[:, :2], centers[:, 2]) - scan.frame.yaw
     obstacles = []
     for candidate, is_on_lane, heading in zip(candidates, on_lane, headings.tolist(), strict=True):
         if not is_on_lane:
@@ -129,8 +129,8 @@ def _fit_clusters(scan: Scan, surroundings: MapContext, groups: list[Integers], 
     headings = np.full(len(groups), np.nan)
     few = [number for number, rows in enumerate(groups) if len(rows) < FEW]
     if few and surroundings.has_map:
-        centers = np.array([scan.points[groups[number], :2].mean(axis=0) for number in few])
-        headings[few] = surroundings.lane_heading(scan.frame.to_world(centers)) - scan.frame.yaw
+        centers = _centers(scan, [groups[number] for number in few])
+        headings[few] = surroundings.lane_heading(centers[:, :2], centers[:, 2]) - scan.frame.yaw
     candidates = []
     for rows, heading in zip(groups, headings.tolist(), strict=True):
         fit = scan.fit(rows, tuple(PRIORS), heading if math.isfinite(heading) else None)
@@ -140,6 +140,12 @@ def _fit_clusters(scan: Scan, surroundings: MapContext, groups: list[Integers], 
             # A cluster that is larger than any road user: its parts at a finer distance.
             candidates += _fit_parts(scan, rows, scan.pattern.azimuth, min_points)
     return candidates
+
+
+def _centers(scan: Scan, groups: list[Integers]) -> Array:
+    """Return the mean of the points of each group in the world (N, 3)."""
+    centers = np.array([scan.points[rows].mean(axis=0) for rows in groups])
+    return np.column_stack([scan.frame.to_world(centers[:, :2]), centers[:, 2]])
 
 
 def _fit_parts(scan: Scan, rows: Integers, step: float, min_points: int) -> list[FittedObject]:

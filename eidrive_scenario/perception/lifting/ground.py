@@ -152,7 +152,7 @@ def lift_by_ground(
     heights = surroundings.ground(view.positions_by_height(), ground)
     for _ in range(LOOKS):
         lifted = view.lift(heights, surroundings)
-        new_heights = surroundings.ground(lifted.boxes[:, :2], ground)
+        new_heights = surroundings.ground(lifted.boxes[:, :2], ground, heights)
         if np.all(np.abs(new_heights - heights) <= LEVEL):
             break
         heights = new_heights
@@ -208,7 +208,7 @@ class _View:
         """Return the boxes in the world for ground heights (N,)."""
         count = len(self._sizes)
         start = self._first_guess(ground)
-        lane = surroundings.lane_heading(self._frame.to_world(start)) - self._frame.yaw
+        lane = surroundings.lane_heading(self._frame.to_world(start), ground) - self._frame.yaw
         on_lane = np.isfinite(lane)
         base = np.where(on_lane, np.nan_to_num(lane), np.arctan2(start[:, 1], start[:, 0]))
         step = np.pi / HEADINGS * np.arange(HEADINGS)

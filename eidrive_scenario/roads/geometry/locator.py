@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from functools import cached_property
 from itertools import chain
 
@@ -108,8 +107,7 @@ class Locator:
         road, lane, outside = np.full(count, -1), np.zeros(count, dtype=np.int64), np.full(count, np.inf)
         s, t, offset, heading = np.zeros((4, count))
         locations = LaneLocations(self._tables.ids, road, lane, s, t, offset, heading, outside)
-        for field in fields(locations)[1:]:
-            getattr(locations, field.name)[order] = getattr(near, field.name)
+        locations.insert(near, order)
         return locations
 
     def _nearest_samples(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -108,6 +108,11 @@ class LaneLocations:
     def found(self) -> NDArray[np.bool_]:
         """True if a road is within reach."""
         return self.road >= 0
+
+    def insert(self, locations: LaneLocations, rows: Integers) -> None:
+        """Set these rows to the given locations (K,)."""
+        for field in fields(self)[1:]:
+            getattr(self, field.name)[rows] = getattr(locations, field.name)
 
     def location(self, index: int) -> LaneLocation | None:
         """Return one location, or None if no road is within reach."""

@@ -291,6 +291,24 @@ def test_road_that_rises_behind_a_dip_is_no_object(street: Any, x: float) -> Non
     assert math.dist(detections.boxes[0, :2], lead.box[:2]) < 0.5
 
 
+@pytest.mark.parametrize("x", [4.0, 6.0, 8.0])
+def test_car_below_a_bridge_faces_along_its_own_lane(street: Any, x: float) -> None:
+    """The car is 0.6 m beside the center of its lane. The bridge, 6.5 m above it, crosses in the opposite direction
+    at an angle of 30 degrees; the center of its right lane is above the car."""
+    hdg, y = math.radians(150.0), -2.35
+    start = (x - 80.0 * math.cos(hdg) - 1.75 * math.sin(hdg), y - 80.0 * math.sin(hdg) + 1.75 * math.cos(hdg))
+    lower = road_xml("1", x=-50.0)
+    upper = road_xml("2", length=160.0, x=start[0], y=start[1], hdg=hdg, profiles=elevation_xml(6.5, 0.0))
+    roads = RoadNetwork.parse(map_xml(lower, upper))
+    ego, car = street.thing("Ego", x - 12.0, -1.75), street.thing("Car", x, y)
+    assert [location.road for location in roads.locations_at(car.x, car.y)] == ["1", "2"]
+    readings = street.readings([ego, car], {"roof": CLEAN})
+    detector = LidarDetector()
+    detector.setup(DetectorContext(street.spec(ego), {"roof": CLEAN}, roads))
+    detections = detector.detect(readings)
+    assert math.cos(detections.boxes[nearest(detections, car.box), 6]) > 0.99
+
+
 @pytest.mark.parametrize(("t", "count"), [(-3.9, 1), (-1.75, 2)], ids=["beside the lane", "on the lane"])
 def test_walls_of_the_map_are_objects_on_lanes_only(street: Any, t: float, count: int) -> None:
     """A wall of the map, 4 m long, from 3.7 m to 4.1 m beside the center of the road as in a tunnel, or on the lane."""

@@ -220,6 +220,20 @@ def test_lift_with_map_uses_road_height() -> None:
     assert found.boxes[0, 2] == pytest.approx(target[2], abs=0.15)
 
 
+def test_car_below_a_bridge_is_lifted_to_its_own_road() -> None:
+    """A bridge crosses 6.5 m above the car, which is 0.5 m beside the center of its lane and below that of the bridge.
+    On the height of the bridge, above the camera, no car fills the box."""
+    lower = road_xml("1", length=120.0, x=-20.0)
+    upper = road_xml("2", length=120.0, x=26.75, y=57.75, hdg=-math.pi / 2.0, profiles=elevation_xml(6.5, 0.0))
+    surroundings = MapContext(RoadNetwork.parse(map_xml(lower, upper)))
+    view = camera(y=-1.75)
+    target = box("car", 25, -2.25, 0.0)
+    lifted = lift(np.array([outline(target, view)]), ["car"], [1.0], view, time=0.0, surroundings=surroundings)
+    assert math.dist(lifted.boxes[0, :2], target[:2]) < 1.0
+    assert lifted.boxes[0, 2] == pytest.approx(target[2], abs=0.15)
+    assert math.cos(lifted.boxes[0, 6]) > 0.99
+
+
 @pytest.mark.parametrize("distance", [9.0, 16.0, 25.0])
 @pytest.mark.parametrize("degrees", [0, 40, 90])
 def test_lift_with_lidar_is_accurate(street: Any, distance: float, degrees: float) -> None:
