@@ -403,6 +403,20 @@ def test_longitudinal_distance_without_limits_applies_at_once(scene: RunScene, a
 
 
 @pytest.mark.element("LongitudinalDistanceAction")
+@pytest.mark.parametrize("continuous", ["true", "false"])
+def test_longitudinal_distance_without_limits_applies_during_a_lane_change(scene: RunScene, continuous: str) -> None:
+    """The gap is 50 m. The lane change takes 4 s; a lateral step of 0.1 m shortens a step of 1 m by 5 mm."""
+    change = """<PrivateAction><LateralAction><LaneChangeAction>
+      <LaneChangeActionDynamics dynamicsShape="linear" dynamicsDimension="time" value="4"/>
+      <LaneChangeTarget><AbsoluteTargetLane value="-2"/></LaneChangeTarget></LaneChangeAction></LateralAction>
+      </PrivateAction>"""
+    gap = keep(f'distance="30" freespace="false" continuous="{continuous}" coordinateSystem="road"')
+    played = scene(2, ("Ego", change), ("Ego", gap))
+    for time in (0.1, 0.2, 1.0):
+        assert played.at(time, "Other").x - played.at(time).x == pytest.approx(30.0, abs=0.06)
+
+
+@pytest.mark.element("LongitudinalDistanceAction")
 def test_longitudinal_distance_with_limits_is_reached_within_them(scene: RunScene) -> None:
     limits = '<DynamicConstraints maxAcceleration="3" maxDeceleration="3" maxSpeed="25"/>'
     played = scene(40, ("Ego", keep('distance="20" freespace="false" continuous="false"', limits)))

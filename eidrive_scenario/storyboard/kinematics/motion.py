@@ -158,6 +158,9 @@ class Motion(MotionState):
         steering, self._lateral_step = self._lateral_step, None
         target, self._next_pose = self._next_pose, None
         lane_distance, self._lane_distance = self._lane_distance, None
+        if steering is not None and lane_distance is not None:
+            # The requested distance applies, not that of the speed at which the lateral action decided.
+            steering = steering._replace(distance=None)
         if target is not None and lane_distance is not None and self._pose_at_distance is not None:
             target = self._pose_at_distance(lane_distance)
         if self._stops and target is None:
