@@ -28,6 +28,7 @@ class DecelerationToAvoidCrash(LeaderCriterion):
     unit = "m/s²"
     quantity = "deceleration to avoid a crash"
     largest = True
+    in_contact = math.inf
 
     def __init__(self, settings: DecelerationToAvoidCrashSettings) -> None:
         super().__init__(settings, settings.at_most)

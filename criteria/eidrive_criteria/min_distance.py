@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Literal
 
-from eidrive_criteria.pairs import PairCriterion, PairSettings
+from eidrive_criteria.pairs import PairCriterion, PairSettings, has_contact
 from eidrive_scenario.api.common import WorldView, box_distance
 
 
@@ -40,7 +40,7 @@ class MinDistance(PairCriterion):
         a, b = view.plain_boxes[of], view.plain_boxes[to]
         center = math.hypot(b[0] - a[0], b[1] - a[1])
         box = center - (math.hypot(a[3], a[4]) + math.hypot(b[3], b[4])) / 2.0
-        if view.contacts and any({contact.first, contact.second} == {self.of, self.to} for contact in view.contacts):
+        if has_contact(view, self.of, self.to):
             box = 0.0  # Bodies with a contact within the step may be apart at its end.
         elif box <= self._box:  # A larger lower bound cannot reduce the minimum.
             box = box_distance(a, b)

@@ -22,6 +22,11 @@ from eidrive_scenario.api.criteria import (
 )
 
 
+def has_contact(view: WorldView, of: str, to: str) -> bool:
+    """Return whether two actors touched during the step before the view; they may be apart at its end."""
+    return any({contact.first, contact.second} == {of, to} for contact in view.contacts)
+
+
 class PairSettings(CriterionSettings):
     """Settings: `{of: Ego, to: Incoming, at_least: 3.5}`. Without `at_least` the criterion only measures and passes."""
 
@@ -128,12 +133,15 @@ class LeaderCriterion(SurroundedCriterion):
     """Description of the quantity for reasons."""
     largest: ClassVar[bool] = False
     """Whether the extreme is a maximum."""
+    in_contact: ClassVar[float | None] = None
+    """Quantity in a crash with the leader; None for that of the frame."""
 
     def __init__(self, settings: LeaderSettings, limit: float | None) -> None:
         super().__init__(settings, settings.of, settings.to)
         self._target = settings.to or "an actor"
         self._extreme = Extreme(limit, largest=self.largest)
-        self._other = ""
+        self._leader = self._other = ""
+        """Leader in the last frame, and that of the extreme."""
 
     @abstractmethod
     def measure(self, leader: Relation) -> float | None:
@@ -144,13 +152,19 @@ class LeaderCriterion(SurroundedCriterion):
         if self.missing:
             self.missing.difference_update(view.names)
         leader = self.surroundings.leader(view, self.of, self.others)
-        value = self.measure(leader) if leader is not None else None
-        if value is None or leader is None:
+        value, other = (self.measure(leader), leader.other) if leader is not None else (None, "")
+        if self.in_contact is not None:
+            # Bodies with a contact within the step may be apart, and beside each other, at its end.
+            for name in (self._leader, other):
+                if has_contact(view, self.of, name):
+                    value, other = self.in_contact, name
+            self._leader = leader.other if leader is not None else ""
+        if value is None:
             return
         if self._extreme.add(value, view.time):
-            self._other = leader.other
+            self._other = other
         if self._extreme.violated is not None:
-            self.violated_with = self.violated_with or leader.other
+            self.violated_with = self.violated_with or other
 
     def verdict(self) -> Verdict:
         if self.missing:

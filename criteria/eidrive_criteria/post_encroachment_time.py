@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from eidrive_criteria.folds import falls_below
-from eidrive_criteria.pairs import PairCriterion, PairSettings
+from eidrive_criteria.pairs import PairCriterion, PairSettings, has_contact
 from eidrive_scenario.api.common import WorldView
 from eidrive_scenario.api.criteria import Continuity, Frame, half_projection, separating_axes
 
@@ -91,6 +91,8 @@ class PostEncroachmentTime(PairCriterion):
 
     def measure(self, view: WorldView, of: int, to: int) -> float:
         """Return the smaller time of both orders with an arrival in this frame; infinite if there is none."""
+        if has_contact(view, self.of, self.to):
+            return 0.0  # Motion at constant velocity between frames does not reach the other body of a crash.
         first, second = self._trails[self.of], self._trails[self.to]
         of_first = time_between(first, second, view.time, self.smallest)
         return min(of_first, time_between(second, first, view.time, min(self.smallest, of_first)))

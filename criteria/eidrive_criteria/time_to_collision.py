@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from eidrive_criteria.accelerated_contact import accelerated_contact, course
-from eidrive_criteria.pairs import PairCriterion, PairSettings
+from eidrive_criteria.pairs import PairCriterion, PairSettings, has_contact
 from eidrive_scenario.api.common import WorldView
 from eidrive_scenario.api.criteria import time_to_contact
 
@@ -32,6 +32,8 @@ class TimeToCollision(PairCriterion):
         self._accelerations = settings.accelerations
 
     def measure(self, view: WorldView, of: int, to: int) -> float:
+        if has_contact(view, self.of, self.to):
+            return 0.0  # The bodies may be apart at the end of the step.
         own, other = view.boxes[of].tolist(), view.boxes[to].tolist()
         if self._accelerations:
             return accelerated_contact(own, other, course(view, of), course(view, to))

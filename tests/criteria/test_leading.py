@@ -6,6 +6,7 @@ import pytest
 from eidrive_criteria.deceleration_to_avoid_crash import DecelerationToAvoidCrash, DecelerationToAvoidCrashSettings
 from eidrive_criteria.time_headway import TimeHeadway, TimeHeadwaySettings
 
+from eidrive_scenario.api.common import Contact
 from eidrive_scenario.api.criteria import Criterion, Verdict, evaluate_criteria
 
 
@@ -85,6 +86,25 @@ def test_contact_needs_an_infinite_deceleration(frame: Any, car: Any) -> None:
     cars = {"Ego": car(0, speed=10.0), "Lead": car(3.9, speed=5.0)}
     verdict = judge(deceleration(at_most=8.0), [frame(0.0, cars)])
     assert (verdict.passed, verdict.value) == (False, float("inf"))
+
+
+@pytest.mark.parametrize("lead", [(4.2, 0.0, 0.0, 6.0), (3.0, 2.1, 0.0, 6.0), (4.2, 0.0, 0.0, -6.0)])
+def test_contact_within_a_step_needs_an_infinite_deceleration(frame: Any, car: Any, lead: Any) -> None:
+    """At the end of the step the bodies are apart: ahead, beside, or approaching again."""
+    contact = Contact("Lead", "Ego", (2.0, 0.0, 0.5), 5.0)
+    frames = [
+        frame(0.0, {"Ego": car(-0.4, speed=10.0), "Lead": car(4.0, speed=5.0)}),
+        frame(0.05, {"Ego": car(0, speed=5.0), "Lead": car(*lead)}, contacts=[contact]),
+    ]
+    for settings in ({}, {"to": "Lead"}):
+        verdict = judge(deceleration(at_most=1000.0, **settings), frames)
+        assert (verdict.passed, verdict.value, verdict.first_violation) == (False, float("inf"), 0.05)
+
+
+def test_contact_with_the_follower_needs_no_deceleration(frame: Any, car: Any) -> None:
+    cars = {"Ego": car(0, speed=5.0), "Back": car(-4.2, speed=5.0), "Lead": car(24.0, speed=5.0)}
+    contact = Contact("Back", "Ego", (-2.0, 0.0, 0.5), 5.0)
+    assert judge(deceleration(), [frame(0.0, cars, contacts=[contact])]).value == 0.0
 
 
 def test_standing_actor_has_no_headway(frame: Any, car: Any) -> None:

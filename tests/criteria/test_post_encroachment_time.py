@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from eidrive_criteria.post_encroachment_time import PostEncroachmentTime, PostEncroachmentTimeSettings
 
+from eidrive_scenario.api.common import Contact
 from eidrive_scenario.api.criteria import Frame, Verdict, evaluate_criteria
 
 EGO, OTHER = (4.6, 3.0, 1.5), (4.8, 4.0, 1.5)
@@ -49,6 +50,14 @@ def test_simultaneous_occupation_is_zero(frame: Any, car: Any) -> None:
     """The other one is in the zone from 2.000 s to 3.114 s, together with the ego."""
     verdict = judge(crossing(frame, car, 14.0), at_least=0.1)
     assert (verdict.passed, verdict.value) == (False, 0.0)
+
+
+def test_contact_within_a_step_is_zero(frame: Any, car: Any) -> None:
+    """The bodies are 0.2 m apart before and after the step of the contact."""
+    cars = {"Ego": car(0), "Other": car(4.2)}
+    contact = Contact("Ego", "Other", (2.0, 0.0, 0.5), 5.0)
+    verdict = judge([frame(0.0, cars), frame(0.05, cars, contacts=[contact])], at_least=0.1)
+    assert (verdict.passed, verdict.value, verdict.first_violation) == (False, 0.0, 0.05)
 
 
 def test_zone_that_one_actor_never_reaches_is_undefined(frame: Any, car: Any) -> None:

@@ -9,6 +9,7 @@ from eidrive_criteria.accelerated_contact import Course, accelerated_contact
 from eidrive_criteria.time_to_collision import TimeToCollision, TimeToCollisionSettings
 from msgspec.structs import replace
 
+from eidrive_scenario.api.common import Contact
 from eidrive_scenario.api.criteria import Verdict, evaluate_criteria
 from eidrive_scenario.base.geometry import overlap
 from eidrive_scenario.evaluation.nearest_actor import time_to_contact
@@ -63,6 +64,15 @@ def test_time_to_collision_minimum_is_compared(frame: Any, car: Any) -> None:
     assert (verdict.passed, verdict.first_violation) == (False, 1.0)
     assert verdict.value == pytest.approx(2.0)
     assert minimum.metrics() == {"time_to_collision.Ego.Lead": pytest.approx(2.0)}
+
+
+@pytest.mark.parametrize("accelerations", [False, True])
+def test_time_to_collision_of_a_contact_within_a_step_is_zero(frame: Any, car: Any, accelerations: bool) -> None:
+    """At the end of the step the bodies are 0.2 m apart and move away from each other."""
+    contact = Contact("Lead", "Ego", (2.0, 0.0, 0.5), 5.0)
+    crash = frame(0.05, {"Ego": car(0, speed=3.0), "Lead": car(4.2, speed=7.0)}, contacts=[contact])
+    (verdict,) = evaluate_criteria([crash], [criterion(at_least=0.01, accelerations=accelerations)])
+    assert (verdict.passed, verdict.value, verdict.first_violation) == (False, 0.0, 0.05)
 
 
 def test_time_to_collision_without_collision_course_passes(frame: Any, car: Any) -> None:
