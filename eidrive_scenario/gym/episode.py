@@ -10,6 +10,7 @@ import msgspec
 from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackFactory
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.driving.step import AgentStep, StationAction, StationPerception
+from eidrive_scenario.errors import NOT_JUDGED
 from eidrive_scenario.openscenario import ConcreteRun, Scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunResult, RunSettings, Simulation
@@ -96,7 +97,10 @@ class Episode:
                 if end is None:
                     self.start = self.simulation.begin_tick()
         if end is not None:
-            self.result = self.simulation.result()
+            result = self.simulation.result()
+            # Criteria that the episode adds end it, and do not judge it.
+            is_judged = len(result.criteria) > len(self._colliding) or self.simulation.settings.no_criteria
+            self.result = result if is_judged else replace(result, passed=False, exit_code=NOT_JUDGED)
             self.simulation.close()
         for observe in self.observers:
             observe(self)

@@ -12,6 +12,7 @@ from eidrive_scenario.driving.planning.path import PathPart
 from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.step import AgentStep, StationPerception
 from eidrive_scenario.errors import NOT_JUDGED, Diagnostic, SettingError, suggestion
+from eidrive_scenario.evaluation.criteria_parser import EXITS
 from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision
 from eidrive_scenario.extensions.settings import S, Settings, parse_settings
 from eidrive_scenario.gym.actions import ActionDecoder
@@ -209,7 +210,8 @@ class Rewards:
 
     def terms_of_end(self, result: RunResult) -> dict[str, float]:
         """Return the terms of the end of a run. Raise SettingError if the run has no criterion of a weighted name."""
-        verdicts = {verdict.name: verdict.passed for verdict in result.criteria}
+        # A command that was not executed has no verdict.
+        verdicts = {**dict.fromkeys(EXITS, False), **{verdict.name: verdict.passed for verdict in result.criteria}}
         self.check_criteria(verdicts)
         weights = self.settings
         terms = {f"criteria.{name}": weight * verdicts[name] for name, weight in weights.criteria.items()}

@@ -13,7 +13,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from lone_car import lone_car
 
-from eidrive_scenario.errors import InputError, SettingError, SimulationError
+from eidrive_scenario.errors import NOT_JUDGED, InputError, SettingError, SimulationError
 from eidrive_scenario.gym import ENVIRONMENT_ID, EidriveEnv
 from eidrive_scenario.simulation import RunResult, RunSettings, run_file
 
@@ -208,6 +208,29 @@ def test_actions_outside_of_the_space_are_errors(action: Any, given: Any, messag
     with pytest.raises(SettingError, match=message):
         env.step(given)
     env.close()
+
+
+@pytest.mark.parametrize("terminate", [True, False])
+@pytest.mark.parametrize(("max_steps", "end"), [(None, "stop trigger"), (3, "time limit")])
+def test_episode_without_criteria_neither_passes_nor_fails(terminate: bool, max_steps: int | None, end: str) -> None:
+    rewards = {"passed": 1.0, "failed": -1.0}
+    env = EidriveEnv(lone_car(0.5), terminate_on_collision=terminate, max_steps=max_steps, reward=rewards)
+    *_, info = play(env, [0.0], seed=1)
+    assert (info["end_reason"], info["passed"], info["result"].exit_code) == (end, False, NOT_JUDGED)
+    assert (info["reward_terms"]["passed"], info["reward_terms"]["failed"]) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("name", ["exitSuccess", "exitFailure"])
+def test_reward_of_exit_command_that_is_not_executed_is_zero(name: str) -> None:
+    env = EidriveEnv(lone_car(0.5), reward={"criteria": {name: 10.0}})
+    *_, info = play(env, [0.0], seed=1)
+    assert info["reward_terms"][f"criteria.{name}"] == 0.0
+
+
+def test_episode_with_own_criterion_passes() -> None:
+    env = EidriveEnv(lone_car(0.5), settings=RunSettings(criteria={"time_limit": {"within": 60}}))
+    *_, info = play(env, [0.0], seed=1)
+    assert (info["passed"], info["reward_terms"]["passed"]) == (True, 5.0)
 
 
 @pytest.mark.parametrize("name", ["colision", "no such"])

@@ -184,7 +184,8 @@ def test_grid_cells_of_an_object_contain_its_existence_and_velocity() -> None:
 
 def test_reward_terms_are_weights_by_quantities() -> None:
     weights = RewardSettings(progress=1.0, comfort=0.0, time_to_collision=0.0, time=-0.5, passed=7.0)
-    env = EidriveEnv(lone_car(2.0), reward=weights, action="pedals")
+    settings = RunSettings(criteria={"time_limit": {"within": 60}})
+    env = EidriveEnv(lone_car(2.0), reward=weights, action="pedals", settings=settings)
     env.reset(seed=1)
     assert env._episode is not None
     start = env._episode.start.view.position[0, 0]
