@@ -7,6 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from eidrive_criteria.folds import exceeds
 from eidrive_scenario.api.criteria import (
     Criterion,
     CriterionSettings,
@@ -61,8 +62,8 @@ class ChannelBusyRatio(Criterion):
             reason = "no channel with a busy ratio was used"
         else:
             reason = f"{largest[0]} measured a busy channel for {100 * largest[1]:.1f} % of the time"
-        exceeds = value is not None and limit is not None and value > limit
-        return self.conclude(self._was_present and not exceeds, reason, value=value, limit=limit)
+        is_busy = value is not None and exceeds(value, limit)
+        return self.conclude(self._was_present and not is_busy, reason, value=value, limit=limit)
 
     def metrics(self) -> Mapping[str, float]:
         """Return the ratio of each station that measures one."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, NamedTuple
 
@@ -9,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from eidrive_criteria.folds import exceeds
-from eidrive_scenario.api.common import Array
+from eidrive_scenario.api.common import EPSILON, Array
 from eidrive_scenario.api.criteria import Continuity, Criterion, CriterionSettings, Frame, Verdict, actor_never_present
 
 Limit = Annotated[float, Field(gt=0)]
@@ -87,9 +88,13 @@ class Comfort(Criterion):
         state = view.states[row]
         self._parts[-1].append(Sample(view.time, state.velocity_x, state.velocity_y, state.yaw))
 
-    def _extremes(self) -> dict[str, Worst]:
-        """Return the value with the largest ratio to its limit, by quantity."""
+    def _extremes(self) -> tuple[dict[str, Worst], float]:
+        """Return the value with the largest ratio to its limit, by quantity, and the time of the first violation [s].
+
+        The time is infinite without a violation.
+        """
         extremes: dict[str, Worst] = {}
+        first = math.inf
         for part in self._parts:
             if len(part) < FEWEST:
                 continue
@@ -99,7 +104,9 @@ class Comfort(Criterion):
                 worst = Worst(float(ratios[index]), quantity, float(values[index]), part[index].time)
                 if quantity not in extremes or worst.ratio > extremes[quantity].ratio:
                     extremes[quantity] = worst
-        return extremes
+                if exceeds(worst.ratio, 1.0):
+                    first = min(first, part[int(np.argmax(ratios > 1.0 + EPSILON))].time)
+        return extremes, first
 
     def _quantities(self, part: Sequence[Sample]) -> Iterator[tuple[str, Array, float, float]]:
         """Yield name, values (N,), minimum and maximum of each quantity."""
@@ -122,7 +129,8 @@ class Comfort(Criterion):
 
     def verdict(self) -> Verdict:
         of = self._settings.of
-        worst = max(self._extremes().values(), default=None)
+        extremes, first = self._extremes()
+        worst = max(extremes.values(), default=None)
         if not self._parts:
             reason = actor_never_present([of])
         elif worst is None:
@@ -130,19 +138,19 @@ class Comfort(Criterion):
         else:
             quantity = worst.quantity.replace("_", " ")
             reason = f"{quantity} of {of} was {worst.value:.2f}, {worst.ratio:.2f} of its limit, at {worst.time:.2f} s"
-        passed = bool(self._parts) and (worst is None or not exceeds(worst.ratio, 1.0))
+        is_violated = math.isfinite(first)
         return self.conclude(
-            passed,
+            bool(self._parts) and not is_violated,
             reason,
             value=worst.ratio if worst is not None else None,
             limit=1.0,
-            first_violation=worst.time if worst is not None and not passed else None,
+            first_violation=first if is_violated else None,
             is_final=False,
         )
 
     def metrics(self) -> Mapping[str, float]:
         """Return the value of each quantity with the largest ratio to its limit."""
-        return {f"{self.name}.{quantity}": worst.value for quantity, worst in self._extremes().items()}
+        return {f"{self.name}.{quantity}": worst.value for quantity, worst in self._extremes()[0].items()}
 
 
 def _derivative(values: Array, dt: float, window: float, order: int) -> Array:

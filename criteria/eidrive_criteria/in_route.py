@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_criteria.folds import Extreme
+from eidrive_criteria.folds import Extreme, exceeds
 from eidrive_criteria.routed import RouteCriterion, RouteSettings
 from eidrive_scenario.api.criteria import Place, Verdict
 
@@ -48,7 +48,7 @@ class InRoute(RouteCriterion):
         self._farthest.add(place.away, time)
         if place.away > self._settings.beyond:
             self._off += driven or 0.0
-        too_often = self.route is not None and self._off > self._settings.share * self.route.length
+        too_often = self.route is not None and exceeds(self._off, self._settings.share * self.route.length)
         if self._violated is None:
             self._violated = time if too_often else self._farthest.violated
 

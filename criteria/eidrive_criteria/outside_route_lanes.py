@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_criteria.folds import FollowedCriterion
+from eidrive_criteria.folds import FollowedCriterion, exceeds
 from eidrive_criteria.off_road import ALLOWED
 from eidrive_criteria.wrong_lane import STILL, drives_against_lane
 from eidrive_scenario.api.common import RoadNetwork, WorldView
@@ -78,7 +78,7 @@ class OutsideRouteLanes(FollowedCriterion):
         if not self.was_present:
             return self.conclude(False, actor_never_present([self.of]), limit=limit)
         share = self._outside / self._driven if self._driven > 0.0 else 0.0
-        passed = share <= limit
+        passed = not exceeds(share, limit)
         reason = f"{self.of} drove {self._outside:.2f} m of {self._driven:.2f} m outside the lanes of its route"
         if self._first is not None:
             reason += f", first at {self._first:.2f} s"

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from eidrive_criteria.folds import falls_below
 from eidrive_criteria.linked import LinkCriterion, LinkSettings
 from eidrive_scenario.api.criteria import Verdict
 from eidrive_scenario.api.v2x import LinkEvent
@@ -43,7 +44,7 @@ class PacketReceptionRatio(LinkCriterion):
         value = self._ratio()
         reason = f"{self._delivered} of {self._number} messages {self.where} were delivered"
         return self.conclude(
-            not self.missing and (value is None or self._limit is None or value >= self._limit),
+            not self.missing and (value is None or not falls_below(value, self._limit)),
             self.nothing("message") if value is None else reason,
             value=value,
             limit=self._limit,

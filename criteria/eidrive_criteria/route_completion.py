@@ -32,27 +32,29 @@ class RouteCompletion(RouteCriterion):
         super().__init__(settings)
         self._settings = settings
         self.demands_progress = settings.at_least > 0.0 or settings.within is not None
-        self._completed, self._last = 0.0, 0.0
-        """Completed distance, and the farthest place since the last teleport [m]."""
-        self._started = False
+        self._parts: list[tuple[float, float]] = []
+        """Begin and end of each completed part of the route [m]; a teleport begins another one."""
 
     def begin(self) -> None:
-        self._completed, self._started = 0.0, False
+        self._parts = []
 
     def locate(self, time: float, place: Place, driven: float | None) -> None:
-        if not self._started:
-            self._completed = self._last = place.along
-            self._started = True
+        if not self._parts:
+            self._parts.append((0.0, place.along))
         elif driven is None:
-            self._last = place.along
-        elif place.along > self._last:
-            self._completed += place.along - self._last
-            self._last = place.along
+            self._parts.append((place.along, place.along))
+        elif place.along > self._parts[-1][1]:
+            self._parts[-1] = self._parts[-1][0], place.along
 
     def _share(self) -> float | None:
-        if self.route is None or not self._started:
+        if self.route is None or not self._parts:
             return None
-        return min(self._completed / self.route.length, 1.0) if self.route.length > 0.0 else 1.0
+        completed = farthest = 0.0
+        for begin, end in sorted(self._parts):
+            if end > farthest:
+                completed += end - max(begin, farthest)
+                farthest = end
+        return min(completed / self.route.length, 1.0) if self.route.length > 0.0 else 1.0
 
     def verdict(self) -> Verdict:
         settings, value = self._settings, self._share()

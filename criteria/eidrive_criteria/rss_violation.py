@@ -8,6 +8,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from eidrive_criteria.folds import exceeds
 from eidrive_criteria.pairs import LeaderSettings, SurroundedCriterion
 from eidrive_scenario.api.criteria import Frame, Relation, SafeDistanceModel, Verdict, actor_never_present
 
@@ -88,7 +89,7 @@ class RssViolation(SurroundedCriterion):
 
     def verdict(self) -> Verdict:
         of, share = self.of, self._violations / self._ticks if self._ticks else None
-        passed = not self.missing and share is not None and share <= self._share
+        passed = not self.missing and share is not None and not exceeds(share, self._share)
         if self.missing:
             reason = actor_never_present(self.missing)
         elif math.isfinite(self._ratio):

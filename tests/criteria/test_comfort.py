@@ -53,6 +53,15 @@ def test_circle_has_a_lateral_acceleration(frame: Any, car: Any, rate: float, pa
     assert verdict.passed is passed
 
 
+def test_first_violation_is_earlier_than_a_larger_one(frame: Any, car: Any) -> None:
+    """Braking with 5 m/s² until 1.5 s, then with 8 m/s² from 3 s on, of at most 4.05 m/s²."""
+    frames = motion(frame, car, lambda time: 60.0 - 5.0 * min(time, 1.5) - 8.0 * max(time - 3.0, 0.0), until=5.0)
+    verdict = judge(frames, longitudinal_jerk=1000.0, jerk=1000.0)
+    assert verdict.value is not None
+    assert verdict.value > 7.9 / 4.05
+    assert verdict.first_violation == 0.0
+
+
 def test_yaw_rate_and_yaw_acceleration(frame: Any, car: Any) -> None:
     """A turn through the heading of 180 degrees, where the angle jumps."""
     criterion = Comfort(ComfortSettings(of="Ego"))

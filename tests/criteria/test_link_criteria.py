@@ -92,6 +92,7 @@ def test_packet_reception_ratio(traffic: list[Any]) -> None:
     assert ratio(traffic, sender="A", receiver="Ego").value == 0.75
     assert ratio(traffic, receiver="Ego").value == 0.8
     assert ratio(traffic, receiver="Ego", at_least=0.8).passed
+    assert ratio(traffic, receiver="Ego", at_least=0.8 + 9e-7).passed
     verdict = ratio(traffic, receiver="Ego", at_least=0.81)
     assert (verdict.passed, verdict.limit) == (False, 0.81)
     assert "4 of 5 messages to Ego" in verdict.reason
@@ -173,6 +174,7 @@ def test_channel_busy_ratio(traffic: list[Any]) -> None:
         return judge(ChannelBusyRatio(ChannelBusyRatioSettings(**settings)), traffic, links)
 
     assert busy(links, of="Ego", at_most=0.3).value == 0.3
+    assert busy(links, of="Ego", at_most=0.3 - 9e-7).passed
     verdict = busy(links, at_most=0.4)
     assert (verdict.passed, verdict.value, verdict.limit) == (False, 0.5, 0.4)
     assert "B measured" in verdict.reason

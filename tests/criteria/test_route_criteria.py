@@ -66,6 +66,9 @@ def test_long_departure_fails(frame: Any, car: Any) -> None:
     verdict = in_route(frames, route=STRAIGHT, share=0.68)
     assert (verdict.passed, verdict.first_violation) == (False, 3.0)
     assert in_route(frames, route=STRAIGHT, beyond=20, share=0).passed
+    frames = drive(frame, car, (0, 20), (10, 20), (20, 20))
+    assert in_route(frames, route=STRAIGHT, share=0.2 - 9e-9).passed
+    assert not in_route(frames, route=STRAIGHT, share=0.2 - 2e-8).passed
 
 
 def test_shortcut_is_a_departure(frame: Any, car: Any) -> None:
@@ -105,6 +108,18 @@ def test_teleport_and_backward_motion_complete_nothing(frame: Any, car: Any) -> 
     """20 m, 10 m back, 10 m again, a teleport of 200 m, then 20 m more, of 400 m."""
     frames = drive(frame, car, (0, 0), (20, 0), (10, 0), (20, 0), (220, 0), (240, 0))
     assert completion(frames, route=[(0, 0), (400, 0)]).value == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("parts", "share"),
+    [([(0, 200), (0, 100)], 0.5), ([(0, 200), (100, 240)], 0.6), ([(0, 100), (300, 340), (80, 320)], 0.85)],
+)
+def test_part_of_a_route_that_is_driven_twice_counts_once(
+    frame: Any, car: Any, parts: list[tuple[int, int]], share: float
+) -> None:
+    """Between the parts of 400 m, the Ego is teleported."""
+    points = [(float(x), 0.0) for begin, end in parts for x in range(begin, end + 1, 20)]
+    assert completion(drive(frame, car, *points), route=[(0, 0), (400, 0)]).value == pytest.approx(share)
 
 
 def test_last_requested_route_counts(frame: Any, car: Any) -> None:

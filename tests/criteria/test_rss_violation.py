@@ -62,6 +62,8 @@ def test_share_of_the_time_is_compared(frame: Any, car: Any) -> None:
     verdict = judge(frames)
     assert (verdict.passed, verdict.value, verdict.first_violation) == (False, 0.25, 3.0)
     assert judge(frames, share=0.25).passed
+    assert judge(frames[1:], share=0.333333).passed
+    assert not judge(frames[1:], share=0.33333).passed
     assert not judge([], share=1.0).passed
 
 
