@@ -70,7 +70,7 @@ def record_of(item: pytest.Item) -> RunRecord:
 
 def add_properties(item: pytest.Item, entries: Iterable[tuple[str, object]]) -> None:
     """Add properties to the report of a test."""
-    added = list(entries)
+    added = [(printable(name), value) for name, value in entries]  # pytest writes names to JUnit files as they are
     record_of(item).properties.extend(added)
     item.user_properties.extend(added)
 

@@ -55,9 +55,11 @@ class RunScenario(Protocol):
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Parametrize tests that are marked with `scenario` over scenarios, channels and seeds."""
+    """Parametrize tests over channels and seeds, and those that are marked with `scenario` also over scenarios."""
     marker = metafunc.definition.get_closest_marker("scenario")
     if marker is None:
+        if "run_scenario" in metafunc.fixturenames:
+            _repeat_unmarked(metafunc)
         return
     if "run_scenario" not in metafunc.fixturenames:
         if marker in metafunc.definition.own_markers:
@@ -85,6 +87,17 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         for variant in variants
     ]
     metafunc.parametrize("run_scenario", cases, indirect=True)
+
+
+def _repeat_unmarked(metafunc: pytest.Metafunc) -> None:
+    """Parametrize a test without the marker over the channels and seeds of options.
+
+    It gets no test of the success rate, as its calls return results of single runs.
+    """
+    variants = [replace(variant, rate=None) for variant in run_variants(metafunc.config)]
+    if [(variant.channel, variant.seed) for variant in variants] != [(None, 1)]:
+        cases = [pytest.param((None, variant), id=str(variant)) for variant in variants]
+        metafunc.parametrize("run_scenario", cases, indirect=True)
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 
 Properties = list[tuple[str, object]]
 
-_NOT_REPEATED = ("out", "record", "report", "max_runs")
-"""Options that the command of a test omits, as they do not change its run."""
+_NOT_REPEATED = ("out", "record", "topics", "report")
+"""Options that the command of a test omits, as they neither change nor select its run."""
 
 
 def run_and_report(
@@ -69,8 +69,16 @@ def run_and_report(
         return result
     from eidrive_scenario.experiments.success_rate import decide_rate
 
-    verdict = decide_rate(lambda seed: _run(item, file, source, replace(variant, seed=seed), overrides), variant.rate)
+    warnings: dict[str, None] = {}
+
+    def run(seed: int) -> RunResult:
+        result = _run(item, file, source, replace(variant, seed=seed), overrides)
+        warnings.update(dict.fromkeys(result.warnings))
+        return result
+
+    verdict = decide_rate(run, variant.rate)
     add_properties(item, rate_properties(verdict))
+    add_properties(item, ((WARNING, warning) for warning in (*warnings, *variant.replaced)))
     return verdict
 
 
@@ -130,6 +138,8 @@ def _run(
         if keyword not in names:
             raise SettingError(Diagnostic(f"run_scenario: unknown setting {keyword!r}", suggestion(keyword, names)))
     option_names = _option_names(config, variant, overrides)
+    if "criteria" in overrides:
+        variant = replace(variant, added=replace(variant.added, criteria=overrides.pop("criteria")))
     settings: dict[str, Any] = {}
     for option in OPTIONS:
         if (value := option_value(config, option.name)) is not None and option.setting:
@@ -191,7 +201,8 @@ def added_settings(config: pytest.Config, marker: MarkerSettings) -> dict[str, A
     """Return `drive` and `criteria` of a run: of the ini file, the marker and the command line.
 
     A stack of the command line replaces that of the marker for the same entity, and this one that of the ini file.
-    Criteria are added. Raise SettingError for an invalid value.
+    Criteria are added; those of a keyword are in the place of those of the marker. Raise SettingError for an invalid
+    value.
     """
     root, stacks = config.rootpath, Stacks()
     listed = stacks.parse("eidrive_drive", listed_value(config, "drive"))

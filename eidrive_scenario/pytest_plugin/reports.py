@@ -37,7 +37,8 @@ def show_warnings(terminalreporter: Any) -> None:
     tests: dict[str, list[str]] = {}
     for reports in terminalreporter.stats.values():
         for report in reports:
-            if getattr(report, "when", None) == "call":
+            when = getattr(report, "when", None)
+            if when == "call" or (when == "setup" and report.failed):
                 for text in {value for name, value in report.user_properties if name == WARNING}:
                     tests.setdefault(str(text), []).append(report.nodeid)
     if not tests:

@@ -113,10 +113,13 @@ def test_command_of_scenario_without_file_reproduces_test(pytester: pytest.Pytes
             """
         }
     )
-    options = ("--eidrive-time-limit", "2.5", "--eidrive-criterion", "{max_speed: {of: Ego, at_most: 90}}")
+    options = ["--eidrive-time-limit", "2.5", "--eidrive-criterion", "{max_speed: {of: Ego, at_most: 90}}"]
+    options += ["--eidrive-max-runs", "all", "--eidrive-out", "runs", "--eidrive-topics", "foxglove"]
     result = pytester.runpytest_inprocess(*options, "-p", "no:cacheprovider", "-k", "it")
     result.assert_outcomes(failed=1, deselected=1)
     (command,) = {line.removeprefix("reproduce: ") for line in result.outlines if line.startswith("reproduce: ")}
+    assert "--eidrive-max-runs all" in command
+    assert "--eidrive-topics" not in command
     words = command.replace("pytest ", f"{sys.executable} -m pytest -p no:cacheprovider ", 1)
     again = subprocess.run(["/bin/sh", "-c", words], cwd=pytester.path, capture_output=True, text=True, check=False)
     assert "1 failed" in again.stdout, again.stdout + again.stderr

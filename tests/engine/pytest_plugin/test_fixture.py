@@ -65,6 +65,23 @@ def test_any(run_scenario):
     run(project, text).assert_outcomes(passed=1)
 
 
+def test_options_apply_to_tests_without_marker(project: pytest.Pytester) -> None:
+    """Channels and seeds repeat the test, arguments of the call replace them, and criteria are added."""
+    text = """
+def test_any(run_scenario, request):
+    result = run_scenario("drives/first.xosc", criteria={"max_speed": {"of": "Ego"}})
+    assert f"[channel={result.channel}-seed={result.seed}]" in request.node.name
+    assert {"max_speed", "own"} < {verdict.name for verdict in result.criteria}
+    assert run_scenario("drives/first.xosc", channel="none", seed=7).channel == "none"
+"""
+    criterion = ("--eidrive-criterion", "{min_speed: {of: Ego, name: own}}")
+    result = run(project, text, "--eidrive-channel", "ideal,latency_300ms", "--eidrive-seeds", "2", *criterion)
+    result.assert_outcomes(passed=4)
+    run(
+        project, text, "-k", "seed:2", "--eidrive-seeds", "2", "--eidrive-channel", "ideal", *criterion
+    ).assert_outcomes(passed=1, deselected=1)
+
+
 def test_run_scenario_of_invalid_input_fails_without_traceback(project: pytest.Pytester) -> None:
     text = """
 def test_wrong(run_scenario):

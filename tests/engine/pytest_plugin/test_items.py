@@ -162,6 +162,14 @@ def test_junit_properties_contain_all_settings(project: pytest.Pytester) -> None
 
 
 @pytest.mark.process
+def test_junit_file_of_a_name_with_control_characters_is_readable(project: pytest.Pytester) -> None:
+    criterion = r'{max_speed: {of: Ego, name: "a\x01b"}}'
+    options = ("xosc/far.xosc", "-p", "no:cacheprovider", "--junitxml", "junit.xml")
+    project.runpytest_inprocess(*options, "--eidrive-criterion", criterion).assert_outcomes(passed=1)
+    names = {entry.get("name") for entry in ElementTree.parse(project.path / "junit.xml").iter("property")}
+    assert r"a\u0001b.passed" in names
+
+
 def test_failed_python_test_prints_command_of_run(project: pytest.Pytester) -> None:
     project.makepyfile(
         test_own="""

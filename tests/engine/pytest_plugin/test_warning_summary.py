@@ -58,6 +58,36 @@ def test_option_equal_to_marker_list_does_not_warn(pytester: pytest.Pytester, op
     result.stdout.no_fnmatch_line("*warnings of runs*")
 
 
+def test_warning_of_a_run_without_verdict_is_shown(pytester: pytest.Pytester) -> None:
+    """Such a run is an error of the setup of its test."""
+    criterion = ("--eidrive-criterion", "{max_speed: {of: Ego, at_most: 90}}")
+    shutil.copy(PASSING_BY, pytester.path / "scene.xosc")
+    options = ("--eidrive-drive", "Ego", "--eidrive-time-limit", "0.5", *criterion)
+    result = pytester.runpytest_inprocess("-p", "no:cacheprovider", "scene.xosc", *options)
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines(["*warnings of runs*", "*scene[[]seed=1]: *no criterion demands that Ego drives on*"])
+
+
+def test_warnings_of_runs_of_a_success_rate_are_shown_once(pytester: pytest.Pytester) -> None:
+    text = """
+import pytest
+
+@pytest.mark.scenario("scene.xosc", channel=["ideal", "none"], success_rate=0.5)
+def test_marked(run_scenario):
+    assert run_scenario(drive="Ego", time_limit=60).passed
+"""
+    shutil.copy(PASSING_BY, pytester.path / "scene.xosc")
+    pytester.makepyfile(test_marked=text)
+    options = ("test_marked.py", "--eidrive-channel", "none", "--junitxml", "junit.xml")
+    result = pytester.runpytest_inprocess("-p", "no:cacheprovider", *options)
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines(["*warnings of runs*"])
+    warnings = warnings_of(pytester.path / "junit.xml")
+    assert len(warnings) == len({*warnings})
+    assert any("no criterion demands that Ego drives on" in str(warning) for warning in warnings)
+    assert "--eidrive-channel none replaces the marker's channel=['ideal', 'none']" in warnings
+
+
 def test_warnings_of_scenario_files_are_shown_once(pytester: pytest.Pytester) -> None:
     text = PASSING_BY.read_text().replace(
         "<UserDefinedAction>",
