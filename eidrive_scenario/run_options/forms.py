@@ -93,7 +93,9 @@ class Text(Form):
 
     def texts(self, value: Any) -> list[str]:
         if isinstance(value, Mapping):
-            return [json.dumps(value)]
+            from eidrive_scenario.files.yaml_text import flow_yaml
+
+            return [flow_yaml(value, setting="a setting")]
         is_file = os.path.isfile(value) and (self.suffixes is None or Path(value).suffix in self.suffixes)
         return [portable_path(value) if is_file else str(value)]
 

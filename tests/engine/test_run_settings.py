@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import warnings
 from pathlib import Path
 from typing import Any, cast
@@ -43,6 +44,17 @@ def test_channel_as_a_mapping_equals_its_yaml_text(tmp_path: Path) -> None:
     assert results[0].trace_hash == results[1].trace_hash
     assert results[0].settings == results[1].settings
     assert results[0].links[("RSU", "Ego")].lost > 0
+
+
+def test_command_of_a_channel_of_numpy_numbers_and_paths_repeats_it(tmp_path: Path) -> None:
+    (tmp_path / "delays.csv").write_text("0.1\n")
+    trace = {"kind": "trace", "file": tmp_path / "delays.csv"}
+    for seconds, delay in ((np.float32(0.5), None), (np.int64(1), None), (None, trace)):
+        channel = {"delay": delay or {"kind": "constant", "seconds": seconds}}
+        result = run_and_save(ONE, settings=RunSettings(channel=channel, time_limit=0.2), below=tmp_path)
+        text = shlex.split(result.command)[shlex.split(result.command).index("--channel") + 1]
+        again = run_file(ONE, settings=RunSettings(channel=text, time_limit=0.2))
+        assert again.settings == result.settings
 
 
 @pytest.mark.parametrize("seed", ["1", 1.0, None])
