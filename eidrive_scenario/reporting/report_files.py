@@ -15,7 +15,7 @@ from eidrive_scenario.reporting.replay.page import write_replays
 from eidrive_scenario.reporting.run_report.rates import rate_figures
 from eidrive_scenario.reporting.run_report.report import write_run_report
 from eidrive_scenario.reporting.run_report.reported_runs import read_runs, read_sweeps
-from eidrive_scenario.reporting.run_report.run_groups import group_runs
+from eidrive_scenario.reporting.run_report.run_groups import distinct_runs, group_runs
 
 LONGEST_NAME = 200
 """Maximum length of the name of a figure [bytes]."""
@@ -68,7 +68,7 @@ def report_files(
 def write_rate_figures(runs: Sequence[ReportedRun], folder: Path, size: Size) -> int:
     """Write the curves and heat maps of a report as SVG and PDF of a size [mm], and return their number."""
     names: list[str] = []
-    for title, figure in rate_figures(group_runs(runs), size):
+    for title, figure in rate_figures(group_runs(distinct_runs(runs)), size):
         name = re.sub(r"[^\w.-]+", "_", title).encode(errors="replace")[:LONGEST_NAME].decode(errors="ignore")
         while name in names:
             name += "-"

@@ -63,10 +63,14 @@ def stored_runs(paths: Sequence[Path], warn: Callable[[str], None] = warnings.wa
 def stored_sides(*sides: Sequence[Path], warn: Callable[[str], None] = warnings.warn) -> list[list[StoredRun]]:
     """Return the runs of each side as `stored_runs`, all with the same axes.
 
-    They are those of all stores, and the settings that vary within the folders of any side.
+    They are those of all stores, and the settings that vary within the folders of any side. A run in the store and in
+    the folder of a sweep is the one of the store.
     """
     stores = [[run for run, _ in _all_runs(path for path in paths if not _has_results(path))] for paths in sides]
-    folders = [folder_runs([path for path in paths if _has_results(path)], warn) for paths in sides]
+    folders = [
+        _without_copies(folder_runs([path for path in paths if _has_results(path)], warn), swept)
+        for paths, swept in zip(sides, stores, strict=True)
+    ]
     varied = [name for runs in folders for name in varying(runs)]
     axes = _axes([*(name for runs in stores for run in runs for name in run.point), *varied])
     joined: list[list[StoredRun]] = []
@@ -74,6 +78,18 @@ def stored_sides(*sides: Sequence[Path], warn: Callable[[str], None] = warnings.
         last = _last_verdicts((run, Path()) for run in with_axes([*swept, *runs], axes))
         joined.append(sorted((run for run, _ in last), key=lambda run: (run.number, run.key)))
     return joined
+
+
+def _without_copies(runs: Iterable[StoredRun], swept: Iterable[StoredRun]) -> list[StoredRun]:
+    """Return the runs of folders that are not those of a sweep, which may have kept the files of its runs."""
+    keys = {_result_key(run) for run in swept}
+    return [run for run in runs if _result_key(run) is None or _result_key(run) not in keys]
+
+
+def _result_key(run: StoredRun) -> tuple[Any, Any] | None:
+    """Return what only copies of a run have in common; None for a run without a result."""
+    settings = run.result.get("settings_sha256")
+    return (settings, run.result.get("trace_hash")) if settings else None
 
 
 def _has_results(path: Path) -> bool:

@@ -89,7 +89,7 @@ class Matrix:
 def scenario_matrix(groups: Sequence[RunGroup]) -> Matrix | None:
     """Return the matrix of scenarios and settings; None for one scenario, one setting or too many settings."""
     named = zip(groups, group_names(groups), strict=True)
-    return _matrix("scenario", [(group.scenario, name, run) for group, name in named for run in group.distinct], 2)
+    return _matrix("scenario", [(group.scenario, name, run) for group, name in named for run in group.runs], 2)
 
 
 def _name(group: RunGroup, *, detailed: bool = False) -> str:
@@ -116,9 +116,9 @@ def parameter_matrix(runs: Sequence[ReportedRun], varied: Sequence[str]) -> Matr
 
 def axis_matrix(groups: Sequence[RunGroup], axis: str) -> Matrix | None:
     """Return the matrix of the groups of a scenario over the axis of a sweep, with one row per group."""
-    across = _label([run for group in groups for run in group.distinct], axis)
+    across = _label([run for group in groups for run in group.runs], axis)
     named = zip(groups, group_names(groups), strict=True)
-    return _matrix(axis, [(name, across(run), run) for group, name in named for run in group.distinct], ordered=False)
+    return _matrix(axis, [(name, across(run), run) for group, name in named for run in group.runs], ordered=False)
 
 
 def group_names(groups: Sequence[RunGroup]) -> list[str]:
@@ -231,7 +231,7 @@ def _curves(groups: Sequence[RunGroup]) -> Iterator[tuple[str, str, list[RunGrou
         lines = [
             line
             for group, name, color in zip(members, group_names(members), COLORS, strict=False)
-            if (line := _line(group.distinct, axis, name, color)) is not None
+            if (line := _line(group.runs, axis, name, color)) is not None
         ]
         if lines:
             yield scenario, axis, members, lines
@@ -260,7 +260,7 @@ def rate_maps(group: RunGroup) -> Iterator[RateMap]:
     """Yield the heat map of each pair of numbers that vary in a group; none for more than four."""
     for columns, rows, rates in _maps(group):
         pair = columns.name, rows.name
-        matrix = parameter_matrix(group.distinct, pair)
+        matrix = parameter_matrix(group.runs, pair)
         if matrix is not None:
             upwards = replace(matrix, rows=matrix.rows[::-1])
             yield RateMap(
@@ -275,9 +275,9 @@ def _maps(group: RunGroup) -> Iterator[tuple[Levels, Levels, dict[tuple[int, int
     if not 2 <= len(group.numbers) <= MOST_AXES:
         return
     for pair in combinations(group.numbers, 2):
-        columns, rows = (levels_of(group.distinct, name) for name in pair)
+        columns, rows = (levels_of(group.runs, name) for name in pair)
         if columns is not None and rows is not None:
-            rates = _rates(((columns.index(run), rows.index(run)), run) for run in group.distinct)
+            rates = _rates(((columns.index(run), rows.index(run)), run) for run in group.runs)
             if rates:
                 yield columns, rows, rates
 

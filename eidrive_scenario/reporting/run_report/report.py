@@ -28,7 +28,7 @@ from eidrive_scenario.reporting.run_report.rates import (
     scenario_matrix,
     success_rate,
 )
-from eidrive_scenario.reporting.run_report.run_groups import RunGroup, group_runs
+from eidrive_scenario.reporting.run_report.run_groups import RunGroup, distinct_runs, group_runs
 from eidrive_scenario.reporting.run_report.run_table import (
     failure_reason,
     headline,
@@ -74,8 +74,8 @@ def write_run_report(
     given = [parse_run(result) for result in results]
     if not given:
         raise InputError(Diagnostic("no result to report", "give at least one run", str(out)))
-    groups = group_runs(given)
-    runs = [run for group in groups for run in group.distinct]
+    groups = group_runs(distinct_runs(given))
+    runs = [run for group in groups for run in group.runs]
     metrics = _common_metrics(runs)
     titles = metric_titles(runs)
     counts = Counter(run.outcome for run in runs)
@@ -104,8 +104,8 @@ def write_run_report(
                 "channel": group.channel,
                 "content": group.content,
                 "differing": group.differing,
-                "share": success_rate(group.distinct),
-                "summaries": [_summary(group.distinct, name) for name in metrics],
+                "share": success_rate(group.runs),
+                "summaries": [_summary(group.runs, name) for name in metrics],
             }
             for number, group in overview[:MOST_GROUPS]
         ],
@@ -121,13 +121,13 @@ def write_run_report(
 
 
 def _rate_order(entry: tuple[int, RunGroup]) -> float:
-    share = success_rate(entry[1].distinct)
+    share = success_rate(entry[1].runs)
     return share.share if share else -1.0
 
 
 def _varied(group: RunGroup) -> dict[str, Any] | None:
     """Return the tables and heat maps of the values that vary within a group; None without any."""
-    matrix = None if group.numbers == group.varied else parameter_matrix(group.distinct, group.varied)
+    matrix = None if group.numbers == group.varied else parameter_matrix(group.runs, group.varied)
     maps = list(rate_maps(group))
     return {"group": group, "matrix": matrix, "maps": maps} if matrix or maps else None
 

@@ -58,15 +58,19 @@ class RunGroup:
             name for name in self.varied if all(isinstance(run.value_of(name), int | float) for run in self.runs)
         )
 
-    @property
-    def distinct(self) -> tuple[ReportedRun, ...]:
-        """Runs each once: of a run in several folders the first, or the first with a replay."""
-        distinct: dict[object, ReportedRun] = {}
-        for index, run in enumerate(self.runs):
-            key = (run.settings_sha256, run.trace_hash) if run.settings_sha256 else index
-            if key not in distinct or (run.replay and not distinct[key].replay):
-                distinct[key] = run
-        return tuple(distinct.values())
+
+def distinct_runs(runs: Sequence[ReportedRun]) -> list[ReportedRun]:
+    """Return runs each once, whether it is in several folders or in the store and the folder of a sweep.
+
+    It is the first one of a sweep, or the first with a replay, else the first.
+    """
+    distinct: dict[object, ReportedRun] = {}
+    for index, run in enumerate(runs):
+        key = (run.settings_sha256, run.trace_hash) if run.settings_sha256 else index
+        kept = distinct.setdefault(key, run)
+        if (run.is_swept, bool(run.replay)) > (kept.is_swept, bool(kept.replay)):
+            distinct[key] = run if run.replay else run.model_copy(update={"replay": kept.replay})
+    return list(distinct.values())
 
 
 def group_runs(runs: Sequence[ReportedRun]) -> list[RunGroup]:

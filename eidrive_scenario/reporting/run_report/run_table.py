@@ -55,7 +55,7 @@ def run_table(groups: Sequence[RunGroup]) -> dict[str, Any]:
     once. Metrics and settings of runs refer to sets of names, which most runs of a scenario share; of settings, only
     those that differ from the first run with the same set follow.
     """
-    entries = [(run, number) for number, group in enumerate(groups) for run in group.distinct]
+    entries = [(run, number) for number, group in enumerate(groups) for run in group.runs]
     entries.sort(key=lambda entry: OUTCOMES.index(entry[0].outcome))
     runs = [run for run, _ in entries]
     numbers = [number for _, number in entries]

@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 from command_fixtures import Eidrive, eidrive
+from report_table import listed_runs
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.experiments.sweeps.comparison import compare, compare_values
 from eidrive_scenario.experiments.sweeps.results import stored_runs, stored_sides, summaries
+from eidrive_scenario.reporting.report_files import report_files
 from eidrive_scenario.reporting.run_report.reported_runs import read_sweeps
 
 __all__ = ["eidrive"]
@@ -180,3 +182,16 @@ def test_folder_without_results_is_an_error(tmp_path: Path, runs: Path) -> None:
 def test_copies_of_a_run_count_once(runs: Path, tmp_path: Path) -> None:
     shutil.copytree(runs, tmp_path / "copy")
     assert len(list(stored_runs([runs, tmp_path / "copy"]))) == 4
+
+
+def test_runs_of_the_store_and_the_folder_of_a_sweep_count_once(
+    eidrive: Eidrive, scenario: Path, tmp_path: Path
+) -> None:
+    store, out = tmp_path / "s.db", tmp_path / "out"
+    eidrive("sweep", scenario, "--vary", "Speed=5,30", "--workers", "1", "--store", store, "--out", out)
+    assert [(run.point, run.status) for run in stored_runs([out, store])] == [
+        ({"Speed": 5}, "passed"),
+        ({"Speed": 30}, "failed"),
+    ]
+    page = report_files([out, store], tmp_path / "report")
+    assert [run["seed"] for run in listed_runs(page)] == [1, 1]
