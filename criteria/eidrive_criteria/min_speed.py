@@ -59,4 +59,4 @@ class MinSpeed(Criterion):
 
     def metrics(self) -> Mapping[str, float]:
         """Return the minimum speed [m/s]."""
-        return {} if self._slowest.value is None else {f"min_speed.{self._settings.of}": self._slowest.value}
+        return {} if self._slowest.value is None else {f"{self.name}.{self._settings.of}": self._slowest.value}

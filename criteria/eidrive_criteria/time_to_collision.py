@@ -46,5 +46,5 @@ class TimeToCollision(PairCriterion):
 
     def metrics(self) -> Mapping[str, float]:
         """Return the minimum time to collision [s]; empty without a collision course."""
-        pair = f"time_to_collision.{self.of}.{self.to}"
+        pair = f"{self.name}.{self.of}.{self.to}"
         return {pair: self.smallest} if math.isfinite(self.smallest) else {}

@@ -178,7 +178,8 @@ def checked_verdict(criterion: Criterion) -> Verdict:
     for name in ("name", "unit", "reason"):
         if not isinstance(text := getattr(verdict, name), str):
             raise InvalidResult(criterion, "verdict", f"returned {name} = {text!r} (expected a text)")
-    return replace(verdict, **plain)
+    # Two criteria of one class have different names, also if the class returns a constant one.
+    return replace(verdict, **plain, name=criterion.name)
 
 
 def checked_metrics(criterion: Criterion) -> Mapping[str, float]:

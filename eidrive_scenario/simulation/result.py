@@ -99,8 +99,9 @@ class RunResult:
         """Return the result as one flat row: every value is a number, a text, a truth value or None.
 
         Columns: the outcome; `parameter.NAME`, as a number if the value is one; `channel.KEY`, the content of the
-        channel at the start; `NAME.passed`, `.value`, `.limit` of each criterion; the metrics by their names;
-        `warnings`, the number of them. `pandas.DataFrame([result.to_dict() for result in results])` is a table of runs.
+        channel at the start; `NAME.passed`, `.value`, `.limit` of each criterion; the metrics by their names, without
+        those that have the name of another column; `warnings`, the number of them.
+        `pandas.DataFrame([result.to_dict() for result in results])` is a table of runs.
         """
         row: dict[str, Scalar] = {
             "scenario": self.scenario,
@@ -121,7 +122,7 @@ class RunResult:
             row[f"{verdict.name}.passed"] = bool(verdict.passed)
             row[f"{verdict.name}.value"] = None if verdict.value is None else float(verdict.value)
             row[f"{verdict.name}.limit"] = None if verdict.limit is None else float(verdict.limit)
-        row.update((name, float(value)) for name, value in self.metrics.items())
+        row.update((name, float(value)) for name, value in self.metrics.items() if name not in row)
         return {**row, "settings_sha256": self.settings.digest, "trace_hash": self.trace_hash}
 
     def as_json(self) -> dict[str, Any]:

@@ -38,6 +38,9 @@ def test_min_speed_is_required_after_a_time(frame: Any, car: Any) -> None:
     verdict = judge(min_speed(at_least=3.5, after=1.0), frames)
     assert (verdict.passed, verdict.value, verdict.first_violation) == (False, 3.0, 2.0)
     assert judge(min_speed(at_least=1.0), frames).first_violation == 0.0
+    early, late = min_speed(), min_speed(after=1.0, name="late")
+    evaluate_criteria(frames, [early, late])
+    assert {**early.metrics(), **late.metrics()} == {"min_speed.Ego": 0.0, "late.Ego": 3.0}
     verdict = judge(min_speed(after=9.0), frames)
     assert (verdict.passed, verdict.value) == (False, None)
     assert "from 9.00 s on" in verdict.reason

@@ -120,10 +120,10 @@ def _finished(path: Path, number: int) -> StoredRun:
         **{option.name: result.settings.get(option.name) for option in OPTIONS if option.in_row},
         **{f"parameter.{name}": typed(text) for name, text in result.settings.get("parameters", {}).items()},
         **verdicts,
-        **result.metrics,
         "settings_sha256": result.settings_sha256,
         "trace_hash": result.trace_hash,
     }
+    row.update((name, value) for name, value in result.metrics.items() if name not in row)
     return StoredRun(
         result.settings_sha256 or str(path),
         number,

@@ -52,3 +52,15 @@ def test_numbers_beyond_a_float_raise() -> None:
         checked_verdict(Given(10**400))
     with pytest.raises(InvalidResult, match=r"returned 'given\.value': an integer beyond"):
         checked_metrics(Given(10**400))
+
+
+def test_verdicts_have_the_names_of_their_criteria() -> None:
+    """Also if the class returns a constant name: columns of results distinguish verdicts by it."""
+
+    class Constant(Given):
+        def verdict(self) -> Verdict:
+            return Verdict("constant", True, 1.0, None, "", None, "")
+
+    criterion = Constant(1.0)
+    criterion.name = "given_2"
+    assert checked_verdict(criterion).name == "given_2"
