@@ -31,6 +31,7 @@ from eidrive_scenario.simulation.recorded_outcome import (
     plain_verdict,
     recorded_context,
     recorded_outcome,
+    recorded_scope,
 )
 from eidrive_scenario.simulation.result import verdict_json
 from eidrive_scenario.simulation.run_outcome import UNJUDGED, criteria_metrics, exit_code_of
@@ -112,7 +113,8 @@ def _judge(recording: Recording, others: Any) -> Judgement:
             criteria.append(criterion)
 
     if others is not None:
-        add(parse_added_criteria(RunSettings(criteria=others).criteria_sources, recorded_context(recording)))
+        sources, context = RunSettings(criteria=others).criteria_sources, recorded_context(recording)
+        add(parse_added_criteria(sources, context, recorded_scope(recording)))
     elif CONTEXT not in recording.metadata:
         version = recording.metadata.get("eidrive-scenario", "unknown")
         message = f"the recording contains no criteria (written by version {version})"

@@ -17,6 +17,7 @@ from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.model import Axles, MiscObject, Pedestrian, Vehicle
 from eidrive_scenario.openscenario.model.entity_enumerations import VehicleCategory
+from eidrive_scenario.openscenario.values.parameters import Parameter, Scope
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recorder import CHUNK_SIZE, Recorder
@@ -259,6 +260,12 @@ def recorded_context(recording: Recording) -> CriteriaContext:
     """Return the names to which criteria on a recording refer. Those of an older or damaged recording are unknown."""
     context = _metadata(recording, CONTEXT, CriteriaContext, CriteriaContext())
     return replace(context, has_roads=ROAD_FILE in recording.attachments)
+
+
+def recorded_scope(recording: Recording) -> Scope:
+    """Return the parameters of the run to which criteria on a recording refer. Those of a damaged one are unknown."""
+    texts: Mapping[str, str] = _metadata(recording, "parameters", Mapping[str, str], {})
+    return Scope(parameters={name: Parameter(name, text, text, text) for name, text in texts.items()})
 
 
 def _metadata(recording: Recording, name: str, kind: Any, unknown: _Entry) -> _Entry:

@@ -39,6 +39,18 @@ def test_judge_with_other_criterion_fails(eidrive: Eidrive, passing_by: Path, tm
     assert "min_distance" not in judged.stdout
 
 
+def test_criteria_of_judge_refer_to_parameters_of_the_run(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    """As those of `eidrive run`."""
+    criterion = "{max_speed: {of: Ego, at_most: '${2 * $OtherY}'}}"
+    run = eidrive("run", passing_by, "--param", "OtherY=4.5", "--criterion", criterion, "--out", tmp_path, "--json")
+    judged = eidrive("judge", tmp_path, "--criterion", criterion, "--json")
+    speed = json.loads(run.stdout)["criteria"][-1]
+    assert (speed["name"], speed["limit"]) == ("max_speed", 9.0)
+    assert json.loads(judged.stdout)["criteria"] == [speed]
+    unknown = eidrive("judge", tmp_path, "--criterion", "{max_speed: {of: Ego, at_most: $OtherX}}")
+    assert (unknown.exit_code, "OtherX" in unknown.stderr) == (2, True)
+
+
 def test_judge_of_damaged_recording_has_exit_code_three(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
     eidrive("run", passing_by, "--out", tmp_path)
     (path,) = tmp_path.glob("*/recording.mcap")
