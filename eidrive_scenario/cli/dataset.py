@@ -66,6 +66,7 @@ def dataset(
             "--seeds": seeds,
             "--vary": vary,
             "--sensors": sensors,
+            "--jobs": jobs,
             "options of a run": settings != RunSettings(),
         }
         excluded = ", ".join(name for name, value in given.items() if value)

@@ -64,7 +64,9 @@ def export(
     ] = None,
     csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Table as CSV.")] = None,
     parquet: Annotated[Path | None, typer.Option(metavar="FILE", help="Table as Parquet.")] = None,
-    table: Annotated[TableName, typer.Option(help="Table of --csv and --parquet.")] = "actors",
+    table: Annotated[
+        TableName | None, typer.Option(help="Table of --csv and --parquet.", show_default="actors")
+    ] = None,
 ) -> None:
     """Write a recorded run as files of other tools.
 
@@ -82,12 +84,14 @@ def export(
         "--osi": (osi, write_osi),
         "--foxglove": (foxglove, write_foxglove),
         "--mcap": (mcap, write_with_topics),
-        "--csv": (csv, partial(write_csv, table=table)),
-        "--parquet": (parquet, partial(write_parquet, table=table)),
+        "--csv": (csv, partial(write_csv, table=table or "actors")),
+        "--parquet": (parquet, partial(write_parquet, table=table or "actors")),
     }
     given = {option: (path, write) for option, (path, write) in writers.items() if path is not None}
     if not given:
         raise SettingError(Diagnostic("no output is given", f"give one or several of {', '.join(writers)}"))
+    if table is not None and csv is None and parquet is None:
+        raise SettingError(Diagnostic("--table without a table has no effect", "add --csv or --parquet FILE"))
     run = open_run(recording)
     check_output_paths({option: path for option, (path, _) in given.items()}, [run.recording.path])
     for path, write in given.values():

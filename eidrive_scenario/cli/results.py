@@ -46,6 +46,8 @@ def results(
 
     if not 0.0 < confidence < 1.0:
         raise SettingError(Diagnostic(f"--confidence is {confidence}", "give a number between 0 and 1"))
+    if json and failures:
+        raise SettingError(Diagnostic("--json and --failures exclude each other", "give one of them"))
     check_output_paths({"--csv": csv, "--parquet": parquet}, stores)
     runs = list(stored_runs(stores, print_warning))
     names = None if by is None else [name.strip() for name in by.split(",")]

@@ -47,6 +47,11 @@ def test_export_without_output_is_invalid_input(eidrive: Eidrive, recorded: Path
     assert "no output is given; give one or several of --osi" in result.stderr
 
 
+def test_export_of_a_table_without_its_file_is_invalid_input(eidrive: Eidrive, recorded: Path, tmp_path: Path) -> None:
+    result = eidrive("export", recorded, "--osi", tmp_path / "run.mcap", "--table", "objects")
+    assert (result.exit_code, "--table without a table has no effect" in result.stderr) == (2, True)
+
+
 def test_export_of_truncated_recording_warns(eidrive: Eidrive, recorded: Path, tmp_path: Path) -> None:
     (path,) = recorded.glob("*/recording.mcap")
     (tmp_path / "cut.mcap").write_bytes(path.read_bytes()[:-6000])

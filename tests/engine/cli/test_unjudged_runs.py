@@ -148,6 +148,8 @@ def test_sweep_has_no_verdict(eidrive: Eidrive, bare: Path, tmp_path: Path) -> N
     (line, _) = eidrive("results", store, "--json").stdout.splitlines()
     assert json.loads(line)["runs"] == {"not judged": 1}
     assert f"not judged: eidrive run {bare}" in eidrive("results", store, "--failures").stdout
+    both = eidrive("results", store, "--failures", "--json")
+    assert (both.exit_code, "--json and --failures exclude each other" in both.stderr) == (2, True)
     accepted = eidrive("sweep", bare, *options, "--no-criteria")
     assert (accepted.exit_code, "2 passed" in accepted.stdout) == (0, True)
     assert "2 of 2 runs have warnings" in accepted.stderr

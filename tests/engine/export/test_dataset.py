@@ -177,5 +177,7 @@ def test_command_without_a_source_or_with_two_is_invalid_input(eidrive: Eidrive,
     assert (both.exit_code, "--import excludes scenarios, --sensors; " in both.stderr) == (2, True)
     options = eidrive("dataset", "--import", tmp_path, "--channel", "ideal", "--time-limit", "1")
     assert (options.exit_code, "--import excludes options of a run; " in options.stderr) == (2, True)
+    jobs = eidrive("dataset", "--import", tmp_path, "--jobs", "2")
+    assert (jobs.exit_code, "--import excludes --jobs; " in jobs.stderr) == (2, True)
     assert eidrive("dataset", "coop/scenario_1", "--vary", "wether=sunny", "--out", tmp_path / "x").exit_code == 2
     assert not (tmp_path / "x").exists()
