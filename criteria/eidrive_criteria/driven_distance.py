@@ -71,4 +71,4 @@ class DrivenDistance(Criterion):
 
     def metrics(self) -> Mapping[str, float]:
         """Return the driven distance [m]."""
-        return {f"driven_distance.{self._settings.of}": self._distance} if self._was_present else {}
+        return {f"{self.name}.{self._settings.of}": self._distance} if self._was_present else {}

@@ -53,6 +53,14 @@ def test_driven_distance_is_compared_with_at_least(frame: Any, car: Any) -> None
     assert verdicts[0].value == pytest.approx(20.0)
 
 
+def test_metrics_of_driven_distances_with_different_deadlines_are_separate(frame: Any, car: Any) -> None:
+    """10 m at 2 s, 20 m at 4 s."""
+    whole = DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=20.0))
+    early = DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=10.0, by=2.0, name="early"))
+    evaluate_criteria(driving(frame, car), [whole, early])
+    assert {**whole.metrics(), **early.metrics()} == {"driven_distance.Ego": 20.0, "early.Ego": 10.0}
+
+
 def test_driven_distance_excludes_teleports(frame: Any, car: Any) -> None:
     criterion = DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=50))
     (verdict,) = evaluate_criteria([frame(0.0, {"Ego": car(0)}), frame(1.0, {"Ego": car(100)})], [criterion])
