@@ -143,6 +143,36 @@ def test_triggering_entities_with_delay_or_falling_edge_are_those_of_then(group:
         assert set(played.frames[-1].appearances) == {"Ego", "Third"}
 
 
+@pytest.mark.element("selectTriggeringEntities")
+@pytest.mark.parametrize("actor", ["Third", ""])
+def test_actions_of_triggering_entities_start_in_the_order_of_actors(group: Run, actor: str) -> None:
+    """A step of speed takes effect first, whatever the order: from 6 m/s to 10 m/s in 2 s, 8 m/s after 1 s."""
+    both = f'{speed_xml(10, 2)}</Action><Action name="step">{speed_xml(6)}'
+    played = group(1, (actor, both), start=by_entity_xml('<TraveledDistanceCondition value="0"/>', "Third"))
+    assert played.of("Third", "speed")[-1] == pytest.approx(8)
+
+
+LANE_CHANGE = private_xml(
+    '<LateralAction><LaneChangeAction><LaneChangeActionDynamics dynamicsShape="linear" dynamicsDimension="time" '
+    'value="4"/><LaneChangeTarget><AbsoluteTargetLane value="left"/></LaneChangeTarget></LaneChangeAction>'
+    "</LateralAction>"
+)
+CONNECTION = private_xml('<TrailerAction><ConnectTrailerAction trailerRef="Ego"/></TrailerAction>')
+
+
+@pytest.mark.element("selectTriggeringEntities")
+@pytest.mark.parametrize("actor", ["Ego", ""])
+@pytest.mark.parametrize(
+    ("action", "message"), [(LANE_CHANGE, "the target lane is not a number"), (CONNECTION, "is the actor itself")]
+)
+def test_invalid_action_of_triggering_entities_is_an_error_before_the_run(
+    group: Run, actor: str, action: str, message: str
+) -> None:
+    never = by_entity_xml('<SpeedCondition value="90" rule="greaterThan"/>')
+    with pytest.raises(InputError, match=message):
+        group(1, (actor, action), start=never)
+
+
 @pytest.mark.element("EntitySelection")
 def test_empty_selection_is_never_near_and_always_clear(group: Run) -> None:
     empty = '<EntitySelection name="walkers"><Members><ByType objectType="pedestrian"/></Members></EntitySelection>'

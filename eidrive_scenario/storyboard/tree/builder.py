@@ -148,6 +148,7 @@ class Builder:
         self._actions = actions
         self._conditions = conditions
         self._diagnostics: list[Diagnostic] = []
+        self._is_built = False
         self._built: list[Condition] = []
         self.extensions: set[tuple[str, str]] = set()
         """Group and name of each action and condition of the storyboard."""
@@ -167,6 +168,7 @@ class Builder:
         self._diagnostics += self._context.signals.errors
         if self._diagnostics:
             raise ScenarioError(sorted(dict.fromkeys(self._diagnostics), key=lambda p: (p.source, p.line or 0)))
+        self._is_built = True
         return init, root
 
     def _init(self, actions: model.InitActions) -> list[ActionBehaviour]:
@@ -188,7 +190,12 @@ class Builder:
 
     def _act(self, act: model.Act, parents: ElementPath) -> ActElement:
         path = (*parents, act.name)
-        triggering = TriggeringEntities()
+        conditions = act.start_trigger.walk() if act.start_trigger is not None else ()
+        named = [element for element in conditions if isinstance(element, model.TriggeringEntities)]
+        candidates = [
+            name for entities in named for ref in entities.entity_ref for name in self._entities(ref.entity_ref)
+        ]
+        triggering = TriggeringEntities(tuple(dict.fromkeys(candidates)))
         return ActElement(
             self._context,
             path,
@@ -322,10 +329,12 @@ class Builder:
 
     @contextmanager
     def _collecting_errors(self) -> Iterator[None]:
-        """Store the diagnostics of a ScenarioError, which ends the block."""
+        """Store the diagnostics of a ScenarioError, which ends the block. During the run it is raised."""
         try:
             yield
         except ScenarioError as error:
+            if self._is_built:
+                raise
             self._diagnostics += error.diagnostics
 
 

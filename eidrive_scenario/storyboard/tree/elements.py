@@ -244,8 +244,12 @@ class StoryNode(StoryElement):
 
 @dataclass
 class TriggeringEntities:
-    """Entities that fulfilled the start trigger of an act; groups may select them as actors (1.3.1, 7.3.1)."""
+    """Entities that fulfilled the start trigger of an act; groups may select them as actors (1.3.1, 7.3.1).
 
+    candidates  entities of the conditions of the trigger
+    """
+
+    candidates: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
 
 

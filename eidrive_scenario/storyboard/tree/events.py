@@ -77,7 +77,7 @@ class EventElement(StoryElement):
 
 
 class ActionElement(StoryElement):
-    """Action: one behaviour per actor. `make(actor)` builds them, as triggering entities are known at the start only.
+    """Action: one behaviour per actor. `make(actor)` builds them, for all entities that its act may select.
 
     `selections` are the entity selections among the actors, whose members lose their domains together.
     """
@@ -110,6 +110,8 @@ class ActionElement(StoryElement):
         self._decided_at: int | None = None
         for actor in self.actors:
             self.add_children(list(self.behaviours(actor)))
+        for name in triggering.candidates if triggering is not None else ():
+            self.behaviours(name)
 
     def behaviours(self, actor: str | None) -> list[ActionBehaviour]:
         """Return the behaviours of one actor."""
@@ -119,9 +121,7 @@ class ActionElement(StoryElement):
 
     def start(self, why: str = "") -> None:
         """Enter runningState with the actors of the group and the triggering entities."""
-        actors = self.actors
-        if self.triggering is not None:
-            actors = tuple(dict.fromkeys([*actors, *self.triggering.names]))
+        actors = self._selected_actors()
         self.running = [behaviour for actor in actors for behaviour in self.behaviours(actor)]
         self.enter_standby()
         self._tried_at, self._decided_at = self.context.progress.tick, None
@@ -150,7 +150,11 @@ class ActionElement(StoryElement):
     @property
     def takes_time(self) -> bool:
         """Whether one of its behaviours does not end at its start."""
-        return not all(other.at_once for actor in self.actors for other in self.behaviours(actor))
+        return not all(other.at_once for actor in self._selected_actors() for other in self.behaviours(actor))
+
+    def _selected_actors(self) -> Sequence[str | None]:
+        """Return the actors of the group and the triggering entities."""
+        return tuple(dict.fromkeys([*self.actors, *(self.triggering.names if self.triggering is not None else ())]))
 
     def preempt(self, behaviour: ActionBehaviour, why: str) -> None:
         """Stop a behaviour whose domain another action acquired. A behaviour that takes no time is executed before."""
