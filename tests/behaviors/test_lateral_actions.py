@@ -178,6 +178,21 @@ def test_lane_offset_continuous_and_relative_follows_the_reference(scene: RunSce
     assert played.when("action 1", "completeState") is None
 
 
+@pytest.mark.element("LaneOffsetAction")
+def test_lane_offset_is_kept_within_the_lateral_acceleration(scene: RunScene) -> None:
+    """Other moves 4 m aside at once. At 1 m/s² the fastest motion to standstill takes 2 √(4 / 1) = 4 s, half of it 2 s.
+
+    The limit applies "to initially reach and afterwards keep the lane offset" (1.3.1, LaneOffsetActionDynamics).
+    """
+    follow = offset('<RelativeTargetLaneOffset entityRef="Other" value="0"/>', "true", 'maxLateralAcc="1"')
+    played = scene(7, ("Ego", follow), ("Other", teleport_xml(lane_position_xml(-2, 300)), after(0.95)))
+    assert played.at(3.1).y == pytest.approx(-4.0, abs=0.2)
+    assert played.at(5.3).y == pytest.approx(-6.0, abs=1e-6)
+    y = [row["Ego"].y for row in played.rows]
+    rates = [(last - first) / 0.1 for first, last in pairwise(y)]
+    assert max(abs(last - first) / 0.1 for first, last in pairwise(rates)) < 1.0 + 1e-6
+
+
 @pytest.mark.element("LateralDistanceAction")
 def test_lateral_distance_is_reached_at_the_maximum_speed(scene: RunScene) -> None:
     action = """<PrivateAction><LateralAction><LateralDistanceAction entityRef="Other" distance="3" freespace="false"

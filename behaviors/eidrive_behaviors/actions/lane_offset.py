@@ -6,7 +6,7 @@ import math
 
 from py_trees.common import Status
 
-from eidrive_behaviors.actions.following import warn_without_effect
+from eidrive_behaviors.actions.following import RateLimitedValue, warn_without_effect
 from eidrive_behaviors.actions.lane_change import SHIFTED, STANDING, off_road_error
 from eidrive_scenario.api.actions import (
     STEEPEST,
@@ -27,7 +27,7 @@ class LaneOffsetAction(ActionBehaviour):
     The shape is a function of time. Without `maxLateralAcc` the target applies at once. With it the lateral speed is at
     most the forward speed, so that a standing actor waits. A relative offset refers to the lateral position of the
     entity and is positive to the left of its heading. A continuous action holds the offset and follows the entity until
-    a later action ends it.
+    a later action ends it, also within `maxLateralAcc` (1.3.1, LaneOffsetActionDynamics).
     """
 
     domains = Domain.LATERAL
@@ -52,6 +52,8 @@ class LaneOffsetAction(ActionBehaviour):
         else:
             self._transition = TransitionProfile.from_second_derivative(shape, start, target, limit)
         self._offset = start
+        self._limited_offset: RateLimitedValue | None = None
+        """Offset after the transition that follows the entity; None before its end, and without `maxLateralAcc`."""
 
     def update(self) -> Status:
         """Set the offset at the end of the step."""
@@ -62,12 +64,16 @@ class LaneOffsetAction(ActionBehaviour):
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
         if abs(here.offset * self._way(here) - self._offset) > SHIFTED:
             self._start_transition(here)  # in another lane, or after a teleport
+        if self._limited_offset is not None:
+            self._follow(self._limited_offset, here)
+            return Status.RUNNING
         transition, speed, dt = self._transition, self.actor.motion.speed, self.context.dt
         if transition.extent > 0.0 and abs(speed) < STANDING:
             return Status.RUNNING
         relative = self.action.lane_offset_target.relative_target_lane_offset
-        follows = relative is not None and relative.entity_ref != self.actor_name
-        if transition.done and self.action.continuous and follows:
+        follows = self.action.continuous and relative is not None and relative.entity_ref != self.actor_name
+        limit = self.action.lane_offset_action_dynamics.max_lateral_acc
+        if transition.done and follows and limit is None:
             transition.target = self._target(here) * self._way(here)
         offset, most = transition.advance(dt), STEEPEST * abs(speed) * dt
         steep = transition.extent > 0.0 and abs(offset - self._offset) > most
@@ -75,10 +81,19 @@ class LaneOffsetAction(ActionBehaviour):
             offset = self._offset + math.copysign(most, offset - self._offset)
         self._offset = offset
         done = transition.done and not steep
+        if done and follows and limit is not None:
+            self._limited_offset = RateLimitedValue(offset, 0.0, up=limit, down=limit)
         heading = 0.0 if done or abs(speed) < STANDING else None
         rate = None if steep else transition.slope
         self.actor.motion.set_lateral_step(LateralStep(offset, heading, shortens_distance=steep, rate=rate))
         return Status.SUCCESS if done and not self.action.continuous else Status.RUNNING
+
+    def _follow(self, limited: RateLimitedValue, here: LaneLocation) -> None:
+        """Set the offset at the end of a step after the transition."""
+        limited.highest = STEEPEST * abs(self.actor.motion.speed)
+        limited.lowest = -limited.highest
+        self._offset = limited.advance(self._target(here) * self._way(here), self.context.dt)
+        self.actor.motion.set_lateral_step(LateralStep(self._offset, shortens_distance=False, rate=limited.rate))
 
     def _shape(self) -> model.DynamicsShape:
         return self.action.lane_offset_action_dynamics.dynamics_shape
