@@ -70,6 +70,27 @@ def test_trajectory_with_timing_passes_vertices_at_their_times(
     assert played.when("action 0", "completeState") == pytest.approx(start + 2 * scale)
 
 
+@pytest.mark.element("FollowTrajectoryAction", "Timing")
+@pytest.mark.parametrize("domain", ["relative", "absolute"])
+@pytest.mark.parametrize("first", [0.0, 0.5])
+def test_time_to_reach_the_initial_offset_is_deducted_from_all_times(
+    scene: RunScene, domain: str, first: float
+) -> None:
+    """40 m at 10 m/s from `first`, with doubled times from 2 · first at 5 m/s: 10 m after the offset of 20 m 2 s later.
+
+    Until then the actor waits. The action starts with the run, so that both domains have the same times.
+    """
+    timed = [(100.0, -2.0, first), (140.0, -2.0, first + 4.0)]
+    timing = f'<Timing domainAbsoluteRelative="{domain}" offset="0" scale="2"/>'
+    action = follow_points(timed, reference=timing).replace(
+        "<FollowTrajectoryAction>", '<FollowTrajectoryAction initialDistanceOffset="20">'
+    )
+    played = scene(6, ("Ego", action))
+    assert played.at(2 * first + 0.2).x == pytest.approx(121.0)
+    assert played.at(2 * first + 2.0).x == pytest.approx(130.0)
+    assert played.when("action 0", "completeState") == pytest.approx(2 * first + 4.0)
+
+
 def test_trajectory_in_follow_mode_changes_speed_linearly(scene: RunScene) -> None:
     """From 20 m/s, 10 m in 1 s: braking to standstill."""
     timed = [(100.0, -2.0, 0.0), (110.0, -2.0, 1.0)]

@@ -102,9 +102,10 @@ class FollowTrajectoryAction(ActionBehaviour):
     """Motion along a trajectory from its start (or `initialDistanceOffset`) to its end.
 
     Without timing the actor keeps its speed, which other actions may set, and only the path is specified. With timing
-    the vertex of time v is passed at `scale * v + offset`, relative to the start of the run or of the action. In the
-    following mode `follow` the speed then changes linearly between the vertices. After the end the actor keeps its
-    speed and is matched to a lane.
+    the vertex of time v is passed at `scale * v + offset`, relative to the start of the run or of the action. The time
+    to reach `initialDistanceOffset` is deducted from all v (1.3.1, FollowTrajectoryAction). In the following mode
+    `follow` the speed then changes linearly between the vertices. After the end the actor keeps its speed and is
+    matched to a lane.
 
     The heading is that of the file, else that of the curve. A positive speed moves along the curve; where the headings
     of the file are against it, the actor moves tail first, and its speed along the heading is negative. A negative
@@ -171,7 +172,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._progress = TrajectoryProgress(self._layout, self._s)
         self._followed = self._progress
         self.actor.set_progress(self._progress)
-        self._head_start = self._layout.time_at(self._s) if self._s > 0.0 else 0.0
+        self._head_start = self._layout.time_at(self._s) - self._layout.time_at(0.0)
         self._started = self.context.time
         follow = self.action.trajectory_following_mode.following_mode is model.FollowingMode.FOLLOW
         self._follows_limits = follow and not self._layout.given and isinstance(self.actor.entity, model.Vehicle)
@@ -184,7 +185,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._pursuit = self._run = None
         self._begun = self._direction_known = self._teleports = self._is_late = False
         if self._timing is not None and not (self._follows_limits and present):
-            self._s = self._layout.at_time(self._clock(0.0), self._speeds)
+            self._s = self._timed_place(self._clock(0.0))
 
     def _offset(self) -> float:
         """Return the arc length at which the action starts [m]."""
@@ -233,7 +234,7 @@ class FollowTrajectoryAction(ActionBehaviour):
                 self._run = RateLimitedValue(
                     self._pursuit.s, abs(motion.speed), up=faster, down=slower, lowest=0.0, highest=top
                 )
-                behind = layout.at_time(self._clock(0.0), self._speeds) - self._run.value
+                behind = self._timed_place(self._clock(0.0)) - self._run.value
                 self._is_late = abs(behind) > TELEPORT_DISTANCE
         start = layout.at(self._s)
         self._teleports = math.hypot(start.x - motion.pose.x, start.y - motion.pose.y) > TELEPORT_DISTANCE
@@ -291,7 +292,7 @@ class FollowTrajectoryAction(ActionBehaviour):
             done = not layout.closed and self._leaves(self._s, after)
         else:
             clock = self._clock(dt)
-            after = layout.at_time(clock, self._speeds)
+            after = self._timed_place(clock)
             done = clock >= layout.end_time - EPSILON
             if dt > 0.0 and not (done and clock > layout.end_time + EPSILON):
                 motion.set_speed(self._forwards(after) * (after - self._s) / dt)
@@ -342,7 +343,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         if self._run is not None:
             clock = self._clock(dt)
             beyond = max(0.0, clock - layout.end_time) * self._last_speed()
-            wanted = layout.at_time(clock, self._speeds) + beyond
+            wanted = self._timed_place(clock) + beyond
             self._run.value = pursuit.s
             if pursuit.on_path and not self._is_late:
                 self._run.keep(wanted, dt)
@@ -382,10 +383,12 @@ class FollowTrajectoryAction(ActionBehaviour):
 
     def _clock(self, dt: float) -> float:
         assert self._timing is not None
-        elapsed = self.context.time + dt
-        if not self._is_relative:
-            return (elapsed - self._timing.offset) / self._timing.scale
-        return (elapsed - self._started - self._timing.offset) / self._timing.scale + self._head_start
+        elapsed = self.context.time + dt - (self._started if self._is_relative else 0.0)
+        return (elapsed - self._timing.offset) / self._timing.scale + self._head_start
+
+    def _timed_place(self, clock: float) -> float:
+        """Return the arc length at a time of the clock [m]; the actor waits at `initialDistanceOffset`."""
+        return max(self._layout.at_time(clock, self._speeds), self._offset())
 
     def _overrun(self, clock: float) -> float:
         """Return the part of this step after the end of the trajectory [s of its clock]."""
