@@ -8,7 +8,17 @@ import pytest
 from eidrive_behaviors.conditions.values import satisfies
 from openscenario_xml import catalog_xml, parameters_xml, scenario_xml
 from recorded_scene import RunScene, first_start
-from storyboard_xml import act_xml, condition_xml, event_xml, global_xml, group_xml, maneuver_xml, time_xml, trigger_xml
+from storyboard_xml import (
+    act_xml,
+    acts_xml,
+    condition_xml,
+    event_xml,
+    global_xml,
+    group_xml,
+    maneuver_xml,
+    time_xml,
+    trigger_xml,
+)
 from street_scene import NOTHING
 from whole_run import RecordedRun
 
@@ -77,6 +87,24 @@ def test_parameter_action_sets_the_innermost_declaration_only(tmp_path: Path) ->
     Simulation(load_scenario(path), settings=RunSettings(time_limit=1.0), observers=[record]).run()
     begun = {name for name in ("own 7", "own 8", "outer 7", "outer 8", "other 7", "other 8") if record.begun(name)}
     assert begun == {"own 7", "outer 8"}
+
+
+@pytest.mark.element("ParameterSetAction", "CatalogReference")
+def test_parameter_action_sets_the_parameter_of_one_use_of_a_catalog_maneuver(tmp_path: Path) -> None:
+    """The first use starts at once and sets its parameter at 0.5 s; the second one starts then and has its own."""
+    action = global_xml('<ParameterAction parameterRef="Level"><SetAction value="7"/></ParameterAction>')
+    at_first = f"{condition_xml(time_xml(0.45))}{condition_xml(time_xml(0.55, 'lessThan'))}"
+    events = event_xml("set", action, trigger_xml(at_first)) + event_xml("follow", NOTHING, when_parameter_is("7"))
+    (tmp_path / "c.xosc").write_bytes(
+        catalog_xml("c", maneuver_xml(f"{parameters_xml(Level=('double', '2'))}{events}"))
+    )
+    use = group_xml('<CatalogReference catalogName="c" entryName="maneuver"/>')
+    acts = acts_xml(act_xml(use, name="first"), act_xml(use, trigger_xml(condition_xml(time_xml(0.6))), name="second"))
+    path = tmp_path / "s.xosc"
+    path.write_bytes(scenario_xml(catalogs='<ManeuverCatalog><Directory path="."/></ManeuverCatalog>', story=acts))
+    record = RecordedRun()
+    Simulation(load_scenario(path), settings=RunSettings(time_limit=1.0), observers=[record]).run()
+    assert record.begun("follow") == [pytest.approx(0.5)]
 
 
 @pytest.mark.parametrize(

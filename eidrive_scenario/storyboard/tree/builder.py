@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import dataclass
 
 from py_trees.behaviour import Behaviour
@@ -216,7 +217,9 @@ class Builder:
         maneuvers = list(group.maneuver)
         for reference in group.catalog_reference:
             with self._collecting_errors():
-                maneuvers.append(self._context.catalog_entry(reference, model.Maneuver, group))
+                maneuver = self._context.catalog_entry(reference, model.Maneuver, group)
+                # Equal references have the same entry, but each use has its own parameters.
+                maneuvers.append(deepcopy(maneuver) if maneuver.parameter_declarations else maneuver)
         children = [self._maneuver(maneuver, path, bindings) for maneuver in maneuvers]
         return ManeuverGroupElement(self._context, path, children, limit=group.maximum_execution_count)
 
