@@ -88,6 +88,23 @@ def test_action_relative_to_a_deleted_entity_stops(scene: RunScene, action: str,
     assert played.at(3.0).speed == played.at(2.0).speed
 
 
+@pytest.mark.element("SynchronizeAction")
+@pytest.mark.parametrize(("deleted", "stopped"), [(0.475, 1.0), (1.475, 1.55)])
+def test_synchronize_with_a_target_at_an_absent_entity_stops(run: Run, deleted: float, stopped: float) -> None:
+    """It is stopped at its start at 1 s, or as soon as the entity is gone, with a warning."""
+    at_other = '<RelativeLanePosition entityRef="Other" dLane="0" dsLane="0"/>'
+    lane = '<LanePosition roadId="1" laneId="-1" s="400"/>'
+    action = MEET.replace("Other", "Master").replace(f"<TargetPosition>{lane}", f"<TargetPosition>{at_other}")
+    others = {"Other": (-1, 300.0, 10.0), "Master": (-2, 150.0, 10.0)}
+    played = run(2, ("Ego", action, after(0.975)), ("Ego", DELETE, after(deleted)), others=others, driven=False)
+    (stop,) = [
+        change for frame in played.frames for change in frame.changes if change.element == "action 0" and change.why
+    ]
+    assert stop.time == pytest.approx(stopped)
+    assert stop.why == "Other is absent"
+    assert any("SynchronizeAction: not executed, as Other is absent" in text for text in played.result.warnings)
+
+
 def test_speed_relative_to_an_absent_entity_is_stopped_at_its_start(scene: RunScene) -> None:
     played = scene(2, ("Ego", DELETE, after(0.45)), ("Ego", AS_FAST.format("false"), after(0.95)))
     assert transitions(played, "action 1") == [(1.0, "START"), (1.0, "STOP")]

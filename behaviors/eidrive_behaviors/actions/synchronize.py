@@ -99,7 +99,9 @@ class SynchronizeAction(ActionBehaviour):
             master_sense = math.copysign(1.0, master_speed)
             master_way = self._distance(self.action.master_entity_ref, self.action.target_position_master, master_sense)
         except EntityAbsentError:
-            return Status.RUNNING
+            if dt > 0.0:
+                raise
+            return Status.RUNNING  # In Init a later action may place the entity.
         mine, theirs = self.action.target_tolerance or 0.0, self.action.target_tolerance_master or 0.0
         measured = tuple(
             self.context.actors[name].trajectory for name in (self.actor.name, self.action.master_entity_ref)
