@@ -180,6 +180,19 @@ def test_trailer_of_a_deleted_vehicle_stops_at_its_position(run: Run) -> None:
     assert played.of("Trailer", "speed")[-1] == 0.0
 
 
+@pytest.mark.element("DeleteEntityAction")
+def test_deletion_of_an_absent_vehicle_keeps_its_trailer(run: Run) -> None:
+    """The deletion has no effect, with a warning. The trailer enters the world with its vehicle, 4 m behind it."""
+    declared = '<TrailerHitch dx="-1"/><Trailer><TrailerRef entityRef="Trailer"/></Trailer>'
+    train = TRAIN.replace('<TrailerHitch dx="-1"/>', declared)
+    add = global_xml(PLACE.format("Truck", 200))
+    steps = ("Ego", DELETE.format("Truck"), after(0.2)), ("Ego", add, after(0.5))
+    played = run(1, *steps, driven=False, more=train)
+    view = played.frames[-1].view
+    assert view.position[view.row("Trailer"), 0] == pytest.approx(196.0)
+    assert any("no effect: entity 'Truck' is absent" in text for text in played.result.warnings)
+
+
 @pytest.mark.element("ConnectTrailerAction", "DisconnectTrailerAction")
 def test_frames_contain_couplings_of_their_time(run: Run) -> None:
     """The commands of a tick apply to the world of the next one."""

@@ -41,6 +41,7 @@ class DeleteEntityAction(ActionBehaviour):
         if not self.context.actors[name].present:
             message = f"no effect: entity {name!r} is absent"
             self.warn(message, "add it first")
+            return Status.SUCCESS
         self.context.remove_actor(name)
         return Status.SUCCESS
 
