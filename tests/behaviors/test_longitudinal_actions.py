@@ -417,6 +417,16 @@ def test_longitudinal_distance_without_limits_applies_during_a_lane_change(scene
 
 
 @pytest.mark.element("LongitudinalDistanceAction")
+def test_longitudinal_distance_with_a_maximum_speed_only_is_approached_at_it(scene: RunScene) -> None:
+    """Ego closes the gap of 50 m to 20 m by 25 - 10 = 15 m/s in 2 s, and then follows at 10 m/s."""
+    limits = '<DynamicConstraints maxSpeed="25"/>'
+    played = scene(3, ("Ego", keep('distance="20" freespace="false" continuous="true"', limits)))
+    for time, gap, speed in ((1.0, 35.0, 25.0), (1.8, 23.0, 25.0), (3.0, 20.0, 10.0)):
+        assert played.at(time, "Other").x - played.at(time).x == pytest.approx(gap)
+        assert played.at(time).speed == pytest.approx(speed)
+
+
+@pytest.mark.element("LongitudinalDistanceAction")
 def test_longitudinal_distance_with_limits_is_reached_within_them(scene: RunScene) -> None:
     limits = '<DynamicConstraints maxAcceleration="3" maxDeceleration="3" maxSpeed="25"/>'
     played = scene(40, ("Ego", keep('distance="20" freespace="false" continuous="false"', limits)))

@@ -21,10 +21,10 @@ class LongitudinalDistanceAction(ActionBehaviour):
     Trailing is behind the other entity with respect to its heading in each step, leading is ahead of it, also if both
     face each other.
 
-    Without acceleration limits the actor moves to the wanted distance at once and assumes the speed of the other
-    entity. With limits it follows like a critically damped spring, whose stiffness is proportional to the limit, within
-    the limits of speed, acceleration and its rate. Deceleration is a speed change toward 0, also backwards. The
-    standard does not specify the course of the distance.
+    Without acceleration limits the actor moves to the wanted distance at once, or at `maxSpeed`, and assumes the speed
+    of the other entity. With them it follows like a critically damped spring, whose stiffness is proportional to the
+    limit, within the limits of speed, acceleration and its rate. Deceleration is a speed change toward 0, also
+    backwards. The standard does not specify the course of the distance.
     """
 
     domains = Domain.LONGITUDINAL
@@ -55,13 +55,19 @@ class LongitudinalDistanceAction(ActionBehaviour):
         limits, motion = self.action.dynamic_constraints, self.actor.motion
         faster = infinite_if_none(limits.max_acceleration if limits is not None else None)
         slower = infinite_if_none(limits.max_deceleration if limits is not None else None)
+        top = infinite_if_none(limits.max_speed if limits is not None else None)
+        dt = self.context.dt
         other = self._same_way() * self.context.speed(self.action.entity_ref)
         if math.isinf(faster) and math.isinf(slower):
-            motion.move_along_lane(error + other * self.context.dt)
+            way = error + other * dt
+            if math.isfinite(top) and abs(way) > top * dt:
+                top = min(top, self.actor.limits()[0])
+                motion.set_speed(math.copysign(top, way))
+                return error + (other - motion.speed) * dt
+            motion.move_along_lane(way)
             motion.set_speed(other)
             return 0.0
         assert limits is not None
-        dt = self.context.dt
         up, down = faster, slower
         more, less = _max_change(limits.max_acceleration_rate, dt), _max_change(limits.max_deceleration_rate, dt)
         if motion.speed < 0.0 or (motion.speed == 0.0 and error < 0.0):
@@ -73,7 +79,7 @@ class LongitudinalDistanceAction(ActionBehaviour):
         elif wanted > max(self._acceleration, 0.0):
             wanted = min(wanted, self._acceleration + more)
         self._acceleration = wanted
-        top = min(infinite_if_none(limits.max_speed), self.actor.limits()[0])
+        top = min(top, self.actor.limits()[0])
         motion.set_speed(min(max(motion.speed + wanted * dt, -top), top))
         return error + (other - motion.speed) * dt
 
