@@ -102,6 +102,7 @@ NOT_NEGATIVE: Mapping[type[model.Element], tuple[str, ...]] = {
     model.LaneOffsetActionDynamics: ("max_lateral_acc",),
     model.LightState: ("flashing_on_duration", "flashing_off_duration", "luminous_intensity"),
     model.LightStateAction: ("transition_time",),
+    model.LongitudinalDistanceAction: ("distance", "time_gap"),
     model.OffroadCondition: ("duration",),
     model.Performance: _MOTION_LIMITS,
     model.Phase: ("duration",),

@@ -115,6 +115,14 @@ def test_numbers_in_schema_notation_are_read(written: str, value: float) -> None
         (TELEPORT.format(x="-INF"), "x of WorldPosition is -INF"),
         (LIMITED.format(limit="-1"), "maxAcceleration of DynamicConstraints is -1; a number of at least 0 is expected"),
         (
+            LIMITED.format(limit="1").replace('"5"', '"-5"'),
+            "distance of LongitudinalDistanceAction is -5; a number of at least 0 is expected",
+        ),
+        (
+            LIMITED.format(limit="1").replace('distance="5"', 'timeGap="-1"'),
+            "timeGap of LongitudinalDistanceAction is -1; a number of at least 0 is expected",
+        ),
+        (
             SHAPED.format(shape=CLOTHOID.format(length=0, stop=5)),
             "length of Clothoid is 0; a number above 0 is expected",
         ),
