@@ -226,6 +226,16 @@ def test_fog_lights_are_those_at_the_front_and_rear(scene: RunScene) -> None:
     assert {name: light.mode for name, light in lights[5].items()} == {"fogLightsFront": "off", "fogLightsRear": "on"}
 
 
+@pytest.mark.element("LightStateAction")
+@pytest.mark.parametrize(("first", "second"), [("fogLightsFront", "fogLights"), ("fogLights", "fogLightsRear")])
+def test_flashing_fog_light_is_preempted_by_a_light_that_shares_a_part(
+    scene: RunScene, first: str, second: str
+) -> None:
+    """A flashing light lasts until a later action acquires its control domain (7.5.1)."""
+    played = scene(1, ("Ego", LIGHT.format(0, first, "flashing")), ("Ego", LIGHT.format(0, second, "on"), after(0.15)))
+    assert played.when("action 0", "completeState") == pytest.approx(0.2)
+
+
 @pytest.mark.element("CustomCommandAction")
 def test_custom_command_is_emitted_once(scene: RunScene) -> None:
     command = (

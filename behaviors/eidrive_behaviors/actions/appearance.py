@@ -72,9 +72,9 @@ class LightStateAction(ActionBehaviour):
     action: model.LightStateAction
 
     @property
-    def resource(self) -> str:
-        """Name of the light."""
-        return self._light
+    def resources(self) -> tuple[str, ...]:
+        """Names of the lights."""
+        return PARTS.get(self._light, (self._light,))
 
     def initialise(self) -> None:
         """Switch the light."""
@@ -90,7 +90,7 @@ class LightStateAction(ActionBehaviour):
             off_for=default.off_for if state.flashing_off_duration is None else state.flashing_off_duration,
         )
         before = context.appearance(name)
-        switched = {kind: replace(light, light=kind) for kind in PARTS.get(self._light, (self._light,))}
+        switched = {kind: replace(light, light=kind) for kind in self.resources}
         context.set_appearance(name, replace(before, lights={**before.lights, **switched}))
         self._until = light.since + light.fade
 
@@ -127,10 +127,10 @@ class AnimationAction(ActionBehaviour):
     action: model.AnimationAction
 
     @property
-    def resource(self) -> str:
+    def resources(self) -> tuple[str, ...]:
         """Animated component, or `motion` for a pedestrian."""
         kind, target = self._kind_and_target()
-        return MOTION if kind == MOTION else target
+        return (MOTION if kind == MOTION else target,)
 
     def initialise(self) -> None:
         """Start the animation."""
@@ -148,7 +148,8 @@ class AnimationAction(ActionBehaviour):
             gestures=tuple(gesture.gesture.value for gesture in gestures),
         )
         before = context.appearance(name)
-        context.set_appearance(name, replace(before, animations={**before.animations, self.resource: animation}))
+        animations = {**before.animations, **dict.fromkeys(self.resources, animation)}
+        context.set_appearance(name, replace(before, animations=animations))
         self._until = math.inf if animation.loop else animation.since + (animation.duration or 0.0)
 
     def update(self) -> Status:

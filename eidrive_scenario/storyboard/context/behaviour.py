@@ -108,9 +108,9 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
             raise EntityTowedError(self.actor.name)
 
     @property
-    def resource(self) -> str:
-        """Part of a domain that it controls, such as the name of a light; empty for the whole domain."""
-        return ""
+    def resources(self) -> tuple[str, ...]:
+        """Parts of a domain that it controls, such as names of lights; an empty name for the whole domain."""
+        return ("",)
 
     @property
     def actor(self) -> Actor:
