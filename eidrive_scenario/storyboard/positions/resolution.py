@@ -90,7 +90,7 @@ def referenced_entities(position: model.Position) -> tuple[str, ...]:
 def _route(frame: model.RoutePosition, context: ConditionContext, actor: str | None) -> ResolvedPosition:
     roads = roads_of(frame, context)
     within = frame.in_route_position.chosen()
-    route = frame.route_ref.route or context.catalog_entry(frame.route_ref.catalog_reference, model.Route, frame)
+    route = _route_element(frame, context)
     build = partial(
         build_route, route, roads, lambda position: resolve_position(position, context, actor), seed=context.seed
     )
@@ -136,16 +136,27 @@ def trajectory_of(
     )
 
 
+def _route_element(frame: model.RoutePosition, context: ConditionContext) -> model.Route:
+    holder = frame.route_ref
+    return holder.route or context.catalog_entry(holder.catalog_reference, model.Route, frame)
+
+
 def _trajectory_element(frame: model.TrajectoryPosition, context: ConditionContext) -> model.Trajectory:
     holder = frame.trajectory_ref
     return holder.trajectory or context.catalog_entry(holder.catalog_reference, model.Trajectory, frame)
 
 
 def _is_static(frame: model.Element, context: ConditionContext) -> bool:
-    """Whether a position is static."""
-    if not isinstance(frame, model.TrajectoryPosition):
+    """Whether a position is static; one along a curve is, if the positions of the curve are."""
+    if isinstance(frame, model.TrajectoryPosition):
+        curve: model.Element = _trajectory_element(frame, context)
+    elif isinstance(frame, model.RoutePosition):
+        if isinstance(frame.in_route_position.chosen(), model.PositionOfCurrentEntity):
+            return False
+        curve = _route_element(frame, context)
+    else:
         return isinstance(frame, STATIC)
-    inner = (nested for nested in _trajectory_element(frame, context).walk() if isinstance(nested, model.Position))
+    inner = (nested for nested in curve.walk() if isinstance(nested, model.Position))
     return all(_is_static(nested.chosen(), context) for nested in inner)
 
 

@@ -150,6 +150,31 @@ def test_route_position_counts_from_the_first_waypoint(on_street: Any, within: A
     assert resolve_position(model.Position(route_position=frame), on_street).pose[:2] == pytest.approx((x, y), abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("within", "start", "is_static"),
+    [
+        ({"from_lane_coordinates": model.PositionInLaneCoordinates(lane_id="-1", path_s=15)}, None, True),
+        ({"from_road_coordinates": model.PositionInRoadCoordinates(path_s=15, t=-5)}, None, True),
+        ({"from_road_coordinates": model.PositionInRoadCoordinates(path_s=15, t=-5)}, "A", False),
+        ({"from_current_entity": model.PositionOfCurrentEntity(entity_ref="A")}, None, False),
+    ],
+    ids=["lane", "road", "from entity", "of entity"],
+)
+def test_route_position_is_searched_once_unless_it_refers_to_an_entity(
+    on_street: Any, within: Any, start: str | None, is_static: bool
+) -> None:
+    first = waypoint(-1, 10.0)
+    if start is not None:
+        moving = model.Position(relative_lane_position=model.RelativeLanePosition(entity_ref=start, d_lane=0, ds=0))
+        first = model.Waypoint(route_strategy=model.RouteStrategy.SHORTEST, position=moving)
+    route = model.Route(closed=False, name="way", waypoint=(first, waypoint(-1, 100.0)))
+    frame = model.RoutePosition(
+        route_ref=model.RouteRef(route=route), in_route_position=model.InRoutePosition(**within)
+    )
+    position = model.Position(route_position=frame)
+    assert (resolve_position(position, on_street) is resolve_position(position, on_street)) is is_static
+
+
 @pytest.mark.element("TrajectoryPosition")
 def test_trajectory_position_has_s_and_t_of_the_trajectory(on_street: Any) -> None:
     corners = tuple(
