@@ -10,6 +10,7 @@ from opendrive_xml import map_xml, road_xml
 from recorded_scene import RecordedScene, RunScene, first_start
 from storyboard_xml import by_entity_xml, element_state_xml, speed_xml, teleport_xml
 from street_scene import LANES, NOTHING, after
+from whole_run import Run
 
 ORIENTATION = '<Orientation type="relative" h="0.1" p="0" r="0"/>'
 
@@ -120,6 +121,26 @@ def test_triggering_entities_rule_any_and_all(scene: RunScene) -> None:
     fast = '<SpeedCondition rule="greaterThan" value="15"/>'
     assert first_start(scene(1, ("Ego", NOTHING, by_entity_xml(fast, "Ego Other", "any")))) == 0.0
     assert first_start(scene(1, ("Ego", NOTHING, by_entity_xml(fast, "Ego Other", "all")))) is None
+
+
+@pytest.mark.parametrize(
+    "position",
+    [
+        '<RelativeLanePosition entityRef="Other" dLane="0" dsLane="100"/>',
+        '<RelativeLanePosition entityRef="Other" dLane="0" ds="100"/>',
+        '<RelativeRoadPosition entityRef="Other" ds="100" dt="0"/>',
+    ],
+)
+def test_condition_is_false_while_its_moving_position_is_beyond_the_roads(run: Run, position: str) -> None:
+    """The position is 100 m ahead of Other, which drives at 20 m/s from 882 m: after 0.9 s the road of 1000 m ends."""
+    near = by_entity_xml(
+        f'<DistanceCondition value="5000" rule="lessThan" freespace="false"><Position>{position}</Position>'
+        "</DistanceCondition>"
+    )
+    others = {"Other": (-1, 882.0, 20.0)}
+    played = run(2, ("Ego", NOTHING, near), driven=False, others=others, edge="falling")
+    assert played.begun("event 0") == pytest.approx([0.95])
+    assert sum("its condition is not fulfilled while" in text for text in played.result.warnings) == 1
 
 
 def test_conditions_on_absent_entity_are_false(scene: RunScene) -> None:

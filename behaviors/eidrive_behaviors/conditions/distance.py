@@ -12,10 +12,12 @@ from eidrive_scenario.api.actions import (
     ResolvedPosition,
     distance,
     model,
+    referenced_entities,
     resolve_coordinate_system,
     resolve_distance_type,
     resolve_position,
 )
+from eidrive_scenario.api.common import Diagnostic, ScenarioError
 
 DistanceElement = (
     model.DistanceCondition
@@ -60,10 +62,20 @@ class GapCondition(QuantityCondition):
 
 
 def current_place(context: ConditionContext, position: model.Position, entity: str) -> ResolvedPosition | None:
-    """Return the current place of a position; None if it refers to an absent entity."""
+    """Return the current place of a position; None if it refers to an absent entity.
+
+    A position that moves with an entity has no place beyond the roads either, which is a warning.
+    """
     try:
         return resolve_position(position, context, entity)
     except EntityAbsentError:
+        return None
+    except ScenarioError:
+        if not referenced_entities(position):
+            raise
+        frame = position.chosen()
+        message = f"{type(frame).__name__}: its condition is not fulfilled while the position is beyond the roads"
+        context.warn(Diagnostic.at(frame, message, "use a RelativeObjectPosition, which requires no road"))
         return None
 
 
