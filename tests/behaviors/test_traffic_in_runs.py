@@ -89,6 +89,21 @@ def test_swarm_below_its_maximum_number_is_no_warning(run: Run) -> None:
     assert [text for text in played.result.warnings if "at most 0 of 500 road users" in text]
 
 
+@pytest.mark.element("TrafficSwarmAction")
+@pytest.mark.parametrize(("deleted", "stopped"), [(0.475, 1.0), (1.475, 1.55)])
+def test_swarm_around_an_absent_entity_stops(run: Run, deleted: float, stopped: float) -> None:
+    """It is stopped at its start at 1 s, or as soon as its entity is gone; its vehicles then continue."""
+    delete = '<GlobalAction><EntityAction entityRef="Center"><DeleteEntityAction/></EntityAction></GlobalAction>'
+    steps = ("Ego", traffic(swarm(4, center="Center")), at_time(1.0)), ("Ego", delete, at_time(deleted))
+    played = run(2.0, *steps, driven=False, others={"Center": (-2, 400.0, 0.0)})
+    (stop,) = [
+        change for frame in played.frames for change in frame.changes if change.element == "action 0" and change.why
+    ]
+    assert stop.time == pytest.approx(stopped)
+    assert any("TrafficSwarmAction: not executed, as Center is absent" in text for text in played.result.warnings)
+    assert len(crowd(played, 2.0)) == (4 if stopped > 1.0 else 0)
+
+
 def test_swarm_velocity_is_the_initial_speed(run: Run) -> None:
     played = run(0.1, globally=traffic(swarm(more=definition(a="b"), velocity="21")))
     frame = played.frames[1]

@@ -6,6 +6,7 @@ from abc import abstractmethod
 
 from py_trees.common import Status
 
+from eidrive_behaviors.actions.following import check_presence
 from eidrive_scenario.api.actions import (
     ActionBehaviour,
     ResolvedPosition,
@@ -123,6 +124,11 @@ class TrafficSwarmAction(TrafficInstanceAction):
             directions=self._directions(),
             sectors=self._sectors(),
         )
+
+    def update(self) -> Status:
+        """Run until the swarm is stopped, or its central object leaves the world."""
+        check_presence(self, self.action.central_object.entity_ref)
+        return super().update()
 
     def _speeds(self) -> tuple[float, float] | None:
         between = self.action.initial_speed_range or self.action.speed_range
