@@ -261,6 +261,13 @@ def test_only_one_simulation_of_a_process_has_sumo(run: Run, crossing: Callable[
         pass
 
 
+@pytest.mark.parametrize("step", [1 / 30, 0.0125, 0.0004])
+def test_time_step_that_sumo_would_round_is_an_error(crossing: Callable[..., RecordedRun], step: float) -> None:
+    """The resolution of times in SUMO is 1 ms."""
+    with pytest.raises(InputError, match="SUMO cannot simulate the time step of the run"):
+        crossing(EAST, settings=RunSettings(dt=step))
+
+
 def test_sumo_that_is_not_installed_is_an_error(
     crossing: Callable[..., RecordedRun], monkeypatch: pytest.MonkeyPatch
 ) -> None:

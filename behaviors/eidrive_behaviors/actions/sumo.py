@@ -7,7 +7,7 @@ import importlib.util
 from py_trees.common import Status
 
 from eidrive_scenario.api.actions import ActionBehaviour, install_command, model, traffic
-from eidrive_scenario.api.common import ScenarioError, SettingError, SimulationError
+from eidrive_scenario.api.common import EPSILON, ScenarioError, SettingError, SimulationError
 
 
 class SumoAction(ActionBehaviour):
@@ -20,8 +20,12 @@ class SumoAction(ActionBehaviour):
     action: model.CustomCommandAction
 
     def configure(self) -> None:
-        """Require a road network and libsumo, and check the files."""
+        """Require a road network, a time step of SUMO and libsumo, and check the files."""
         roads = self.require_roads()
+        milliseconds = self.context.step * 1000.0
+        if abs(milliseconds - round(milliseconds)) > EPSILON or milliseconds < 1.0:
+            text = f"got {self.context.step:g} s; expected a multiple of 0.001 s"
+            raise self.error("SUMO cannot simulate the time step of the run", text)
         if importlib.util.find_spec("libsumo") is None:
             raise self.error("libsumo is not installed", f"run: {install_command('sumo')}")
         try:
