@@ -49,6 +49,15 @@ def test_selection_with_preempted_member_releases_all_members(group: Run) -> Non
     assert [played.of(name, "speed")[-1] for name in CARS] == pytest.approx([20, 5, 8])
 
 
+@pytest.mark.element("EntitySelection")
+@pytest.mark.parametrize("actors", ["front slow", "slow front"])
+def test_overlapping_selections_are_released_together_in_any_order(group: Run, actors: str) -> None:
+    """A conflict of Ego is one of Second, which is in both selections, and so one of Third: all are at half time."""
+    front = '<EntitySelection name="front"><Members><EntityRef entityRef="Ego"/><EntityRef entityRef="Second"/>'
+    played = group(3, (actors, SLOW_DOWN), ("Ego", SPEED, after(0.95)), more=f"{front}</Members></EntitySelection>")
+    assert [played.of(name, "speed")[-1] for name in CARS] == pytest.approx([5, 8, 8])
+
+
 def test_selection_in_init_with_preempted_member_releases_all_members(group: Run) -> None:
     init = f'<Private entityRef="slow">{SLOW_DOWN}</Private>'
     played = group(3, ("Second", SPEED, after(0.95)), init=init)

@@ -140,11 +140,11 @@ class ActionElement(StoryElement):
             self._change(ElementTransition.END, ElementState.COMPLETE)
 
     def linked_behaviours(self, behaviour: ActionBehaviour) -> Sequence[ActionBehaviour]:
-        """Return the behaviours of the actor and of the entity selections that contain it."""
-        names = {behaviour.actor_name}
-        for members in self._selections:
-            if not names.isdisjoint(members):
-                names |= set(members)
+        """Return the behaviours of the actor and of the entity selections that contain it or each other's members."""
+        names, count = {behaviour.actor_name}, 0
+        while len(names) > count:
+            count = len(names)
+            names.update(*(members for members in self._selections if not names.isdisjoint(members)))
         return [other for other in self.running if other.actor_name in names]
 
     @property
