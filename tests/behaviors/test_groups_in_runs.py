@@ -58,9 +58,16 @@ def test_overlapping_selections_are_released_together_in_any_order(group: Run, a
     assert [played.of(name, "speed")[-1] for name in CARS] == pytest.approx([5, 8, 8])
 
 
-def test_selection_in_init_with_preempted_member_releases_all_members(group: Run) -> None:
-    init = f'<Private entityRef="slow">{SLOW_DOWN}</Private>'
-    played = group(3, ("Second", SPEED, after(0.95)), init=init)
+@pytest.mark.parametrize("reference", ["", "Ego", "alone"])
+def test_selection_in_init_with_preempted_member_releases_all_members(group: Run, reference: str) -> None:
+    """The target is 6 m/s, also as 14 m/s below the speed of Ego, which may be the only member of a selection."""
+    target = (
+        f'<RelativeTargetSpeed entityRef="{reference}" value="-14" speedTargetValueType="delta" continuous="false"/>'
+    )
+    slow_down = SLOW_DOWN.replace('<AbsoluteTargetSpeed value="6"/>', target) if reference else SLOW_DOWN
+    init = f'<Private entityRef="slow">{slow_down}</Private>'
+    alone = '<EntitySelection name="alone"><Members><EntityRef entityRef="Ego"/></Members></EntitySelection>'
+    played = group(3, ("Second", SPEED, after(0.95)), init=init, more=alone)
     assert [played.of(name, "speed")[-1] for name in CARS] == pytest.approx([20, 5, 8])
 
 

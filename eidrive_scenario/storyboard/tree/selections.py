@@ -8,7 +8,7 @@ from itertools import product
 from typing import Any, TypeVar
 
 from eidrive_scenario.errors import Diagnostic, ScenarioError
-from eidrive_scenario.openscenario import model
+from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.openscenario.scenario import EntitySelections
 from eidrive_scenario.storyboard.context.condition import EntityCondition, Measure
 from eidrive_scenario.storyboard.context.contexts import ConditionContext
@@ -25,6 +25,11 @@ EMPTY_MEMBER = ""
 class Selections(EntitySelections):
     """Entity selections of one scenario, and their substitution in elements."""
 
+    def __init__(self, scenario: Scenario) -> None:
+        super().__init__(scenario)
+        self._single: dict[int, tuple[model.Element, Any]] = {}
+        """Elements and the results of `single`, by `id` of the element."""
+
     def alternatives(self, element: E) -> list[E]:
         """Return the element once per combination of members of the selections that it refers to.
 
@@ -36,10 +41,14 @@ class Selections(EntitySelections):
         return [_with_names(element, dict(zip(groups, chosen, strict=True))) for chosen in choices]
 
     def single(self, element: E) -> E:
-        """Return the element with the member of each selection. Raise ScenarioError unless each has one member."""
+        """Return the element with the member of each selection. Raise ScenarioError unless each has one member.
+
+        An element has one result, by which the behaviours of an action are recognized.
+        """
         alternatives = self.alternatives(element)
         if len(alternatives) == 1:
-            return alternatives[0]
+            result: E = self._single.setdefault(id(element), (element, alternatives[0]))[1]
+            return result
         group = min(self._named_groups(element))
         hint = f"got a selection of {len(self.members(group))} entities; expected one entity"
         raise ScenarioError(Diagnostic.at(element, f"{type(element).__name__} refers to selection {group!r}", hint))
