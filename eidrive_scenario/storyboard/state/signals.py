@@ -24,8 +24,8 @@ class SignalCycle:
         self.leader: SignalCycle | None = None
         self.total = math.fsum(phase.duration for phase in self.phases)
         """Duration of the cycle [s], infinite if a phase has no end."""
-        self._selected: tuple[int, float] | None = None
-        """Number of the phase that an action has set, and the time of that [s]."""
+        self._selected = 0, element.delay or 0.0
+        """Number of the phase that an action has set, at first 0, and its start after that of the leader [s]."""
 
     @property
     def first_start(self) -> float:
@@ -35,7 +35,7 @@ class SignalCycle:
 
     def set_phase(self, name: str, time: float) -> None:
         """Start the first phase of this name at `time` [s]. Raise ValueError if there is none."""
-        self._selected = ([phase.name for phase in self.phases].index(name), time)
+        self._selected = [phase.name for phase in self.phases].index(name), time - self._leader_start()
 
     def phase_at(self, time: float) -> int | None:
         """Return the number of the active phase at `time` [s]; None before a cycle without end starts."""
@@ -57,10 +57,12 @@ class SignalCycle:
 
     def _anchor(self) -> tuple[int, float]:
         """Return the number of a phase and its start time [s]."""
-        if self._selected is not None:
-            return self._selected
-        behind = self.element.delay or 0.0
-        return 0, behind if self.leader is None else self.leader.first_start + behind
+        number, behind = self._selected
+        return number, self._leader_start() + behind
+
+    def _leader_start(self) -> float:
+        """Return the start of the first phase of the leader [s]; 0 without a leader."""
+        return 0.0 if self.leader is None else self.leader.first_start
 
 
 def signal_cycles(

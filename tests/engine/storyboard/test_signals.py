@@ -88,6 +88,9 @@ def test_action_starts_a_phase_and_the_cycle_continues() -> None:
     found.set_phase("c2", "go", 30.0)
     assert course(found, [39.95, 40], "c2") == ["go", "caution"]
     assert course(found, [31], "c1") == ["go"]
+    # c1's cycle begins at 33 s instead of 31 s, c2's at 32 s instead of 30 s
+    found.set_phase("c1", "go", 33.0)
+    assert course(found, [41.95, 42], "c2") == ["go", "caution"]
 
 
 def test_phase_without_end_is_kept() -> None:
