@@ -14,6 +14,7 @@ from eidrive_scenario.openscenario.conventions import is_agent_controller as is_
 from eidrive_scenario.openscenario.conventions import property_entries as property_entries
 from eidrive_scenario.openscenario.model.routing import TIME_ATTRIBUTES as TIME_ATTRIBUTES
 from eidrive_scenario.openscenario.model.routing import has_times as has_times
+from eidrive_scenario.openscenario.values.comparisons import satisfies_rule as satisfies_rule
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour as ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import Condition as Condition
 from eidrive_scenario.storyboard.context.condition import EntityCondition as EntityCondition
@@ -22,7 +23,6 @@ from eidrive_scenario.storyboard.context.condition import QuantityCondition as Q
 from eidrive_scenario.storyboard.context.condition import describe_rule as describe_rule
 from eidrive_scenario.storyboard.context.condition import next_change as next_change
 from eidrive_scenario.storyboard.context.condition import relation as relation
-from eidrive_scenario.storyboard.context.condition import satisfies_rule as satisfies_rule
 from eidrive_scenario.storyboard.context.contexts import ActionContext as ActionContext
 from eidrive_scenario.storyboard.context.contexts import ConditionContext as ConditionContext
 from eidrive_scenario.storyboard.context.contexts import ControllerContext as ControllerContext

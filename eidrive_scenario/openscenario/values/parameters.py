@@ -17,6 +17,7 @@ from eidrive_scenario.openscenario.diagnostics import MAX_TEXT, Budget, BudgetEr
 from eidrive_scenario.openscenario.model import ParameterDeclaration, ParameterType, Rule, ValueConstraintGroup
 from eidrive_scenario.openscenario.model.declarations import Limits
 from eidrive_scenario.openscenario.values import expressions
+from eidrive_scenario.openscenario.values.comparisons import satisfies_rule
 from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError, Value
 from eidrive_scenario.openscenario.values.scalars import (
     BOOLEAN,
@@ -256,8 +257,8 @@ def fits_type(text: str, scalar: Scalar) -> bool:
 
 
 def _holds(group: ValueConstraintGroup, value: Any, scalar: Scalar) -> bool:
-    """Whether a value satisfies all constraints. Texts are compared as numbers if both are numbers, as in conditions:
-    lane ids are texts.
+    """Whether a value satisfies all constraints. As in conditions, numbers have a tolerance, and texts are compared as
+    numbers if both are numbers: lane ids are texts.
     """
     for constraint in group.value_constraint:
         sides = value, scalar.convert(_without_fraction(constraint.value, scalar))
@@ -265,7 +266,11 @@ def _holds(group: ValueConstraintGroup, value: Any, scalar: Scalar) -> bool:
             sides = DOUBLE.convert(sides[0]), DOUBLE.convert(sides[1])
         elif scalar is DATE_TIME:
             sides = _in_time_zone(sides[0]), _in_time_zone(sides[1])
-        if not _COMPARISONS[constraint.rule](*sides):
+        if all(isinstance(side, float) for side in sides):
+            is_satisfied = satisfies_rule(sides[0], constraint.rule, sides[1])
+        else:
+            is_satisfied = _COMPARISONS[constraint.rule](*sides)
+        if not is_satisfied:
             return False
     return True
 

@@ -13,6 +13,7 @@ from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.extensions.registry import is_built_in
 from eidrive_scenario.openscenario import model
+from eidrive_scenario.openscenario.values.comparisons import satisfies_rule
 from eidrive_scenario.storyboard.context.contexts import ConditionContext, MotionChange
 
 SYMBOLS = {
@@ -26,26 +27,6 @@ SYMBOLS = {
 
 COMPLEMENTS = {">": "≤", "≥": "<", "<": "≥", "≤": ">", "=": "≠", "≠": "="}
 """Complementary relation by relation."""
-
-
-def satisfies_rule(value: float, rule: model.Rule, limit: float) -> bool:
-    """Compare `value` with `limit` by a Rule of the standard; NaN fulfills no rule."""
-    if value != value:
-        return False
-    match rule._value_:
-        case "greaterThan":
-            return value > limit + EPSILON
-        case "greaterOrEqual":
-            return value >= limit - EPSILON
-        case "lessThan":
-            return value < limit - EPSILON
-        case "lessOrEqual":
-            return value <= limit + EPSILON
-        case "equalTo":
-            return value == limit or abs(value - limit) <= EPSILON
-        case "notEqualTo":
-            return not (value == limit or abs(value - limit) <= EPSILON)
-    raise ValueError(f"unknown rule {rule!r}")
 
 
 def next_change(value: float, limit: float) -> float:

@@ -52,6 +52,8 @@ def test_inner_scope_hides_outer_parameter() -> None:
     [
         ("double", "10", "lessThan", "10.5", True),
         ("double", "10", "lessThan", "10", False),
+        ("double", str(3 * 0.1), "lessOrEqual", "0.3", True),
+        ("double", str(3 * 0.1), "equalTo", "0.3", True),
         ("int", "3", "greaterOrEqual", "3", True),
         ("string", "car", "notEqualTo", "car", False),
         ("string", "-4", "greaterOrEqual", "-5", True),
