@@ -61,7 +61,7 @@ class RelativeClearanceCondition(EntityCondition):
     def _locations(self, context: ConditionContext, name: str) -> list[LaneLocation]:
         """Return locations of an entity: its reference point, and with `freeSpace` the corners of its box."""
         assert context.roads is not None
-        view, is_traffic = context.view, name in context.traffic_names
+        view, is_traffic = context.view, name not in context.actors
         x, y, z = view.position[view.row(name)].tolist()
         other = context.roads.locate_at(x, y, z=z) if is_traffic else context.location(name)
         if other is None:
