@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from openscenario_xml import round_car_xml
 from recorded_scene import RecordedScene, RunScene
 from storyboard_xml import global_xml, private_xml, speed_xml
 from street_scene import after
@@ -183,6 +184,20 @@ def test_action_of_absent_entity_has_no_effect(scene: RunScene, action: str) -> 
     assert next(c.why for c in played.changes if c.element == "action 1" and c.why) == "Other is absent"
     assert (played.at(2.2, "Other").x, played.at(2.2, "Other").y) == (300.0, -2.0)
     assert played.at(3.0, "Other").speed == 0.0
+
+
+@pytest.mark.parametrize(("entry", "speed"), [(0.0, 20.0), (0.5, 0.0)])
+def test_action_of_init_is_performed_if_its_entity_enters_at_once(run: Run, entry: float, speed: float) -> None:
+    """The entity has no position in Init. An action of Init does not wait for it beyond the start of the run."""
+    absent = round_car_xml("Third")
+    add = BACK.replace('"Other"', '"Third"')
+    condition = (after(entry - 0.025),) if entry > 0.0 else ()
+    init = f'<Private entityRef="Third">{SPEED_UP}</Private>'
+    played = run(3, ("Ego", add, *condition), driven=False, more=absent, init=init)
+    view = played.frames[-1].view
+    assert view.speed[view.row("Third")] == pytest.approx(speed)
+    warned = any("SpeedAction: not executed, as Third is absent" in text for text in played.result.warnings)
+    assert warned is (speed == 0.0)
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)], ids=["enters first", "acts first"])

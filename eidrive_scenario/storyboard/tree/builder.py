@@ -97,8 +97,13 @@ class InitBlock(Composite):
 
     def tick_once(self) -> None:
         """Update the running behaviours."""
+        is_first = self.status is Status.INVALID
         for behaviour in tuple(self.running):
+            if is_first and behaviour.is_actor_missing:
+                continue  # The actor may enter the world at this instant.
             try:
+                if behaviour.is_actor_missing:
+                    behaviour.check_actor()
                 behaviour.tick_checked()
             except EntityUnavailableError as unavailable:
                 behaviour.abort(unavailable)
