@@ -136,8 +136,11 @@ class RuntimeContext(ActionContext, ControllerContext):
         if actor is None or not domains:
             return
         for holder_actor, other_domains, other, behaviour in list(self._holders):
-            shares = not set(behaviour.resources).isdisjoint(holder.resources)
-            if holder_actor == actor and other_domains & domains and shares:
+            if (
+                holder_actor == actor
+                and other_domains & domains
+                and not set(behaviour.resources).isdisjoint(holder.resources)
+            ):
                 for preempted in other.linked_behaviours(behaviour):
                     self.release_domains(preempted)
                     other.preempt(preempted, f"{holder.name} acquired its domain")
