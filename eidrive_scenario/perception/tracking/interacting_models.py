@@ -19,7 +19,7 @@ from eidrive_scenario.perception.tracking.motion_models import (
     Standing,
     transposed,
 )
-from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, UncertainPose, pose_jacobian
+from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, UncertainPose, pose_effect, pose_jacobian
 
 SOJOURN = 10.0
 """Mean time for which an object stands before it moves, and moves before it stands [s]: a probability of 0.99 per scan
@@ -153,12 +153,8 @@ class InteractingModels:
         shown[rows] -= measured
         posterior = np.linalg.solve(np.eye(3) + prior @ of_others, prior[None])
         change = np.einsum("nij,nj->ni", posterior, shown)
-        effect = np.zeros((2, *tracks.state.shape[1:], 3))
-        for model, states in zip(effect, tracks.state, strict=True):
-            model[:, :2] = pose_jacobian(states[:, :2], pose.x, pose.y)
-        effect[:, :, -3:] = np.eye(3)
-        if self._base.measures_heading:
-            effect[:, :, HEADING, 2] = 1.0
+        heading = self._base.measures_heading
+        effect = np.stack([pose_effect(states, pose, measures_heading=heading) for states in tracks.state])
         return Tracks(
             tracks.state + np.einsum("mnij,nj->mni", effect, change),
             tracks.covariance + effect @ (posterior - prior) @ np.swapaxes(effect, 2, 3),

@@ -45,6 +45,16 @@ def pose_jacobian(points: Array, x: float, y: float) -> Array:
     return jacobian
 
 
+def pose_effect(state: Array, pose: PoseUncertainty, *, measures_heading: bool) -> Array:
+    """Return the derivatives (N, D, 3) of the states (N, D) of tracks, the last three included, by the pose error."""
+    effect = np.zeros((*state.shape, 3))
+    effect[:, :2] = pose_jacobian(state[:, :2], pose.x, pose.y)
+    if measures_heading:
+        effect[:, HEADING, 2] = 1.0
+    effect[:, -3:] = np.eye(3)
+    return effect
+
+
 def pose_covariance_at(dx: float, dy: float, covariance: Array) -> Array:
     """Return the covariance (3, 3) of the pose error of a station at the place (dx, dy) [m] from it.
 
@@ -139,9 +149,10 @@ class UncertainPose(MotionModel):
         state, covariance = self._base.predict(self._shifted(tracks, before, -1.0), step)
         change = np.eye(self.size)
         change[-3:, -3:] = regression
-        covariance = change @ covariance @ change.T
-        covariance[:, -3:, -3:] += independent
-        return self._shifted(Estimates(state @ change.T, covariance), after, 1.0)
+        moved = self._shifted(Estimates(state @ change.T, change @ covariance @ change.T), after, 1.0)
+        # At the position with the pose error, where InteractingModels.share_pose_change takes this part away again
+        effect = pose_effect(moved.state, after, measures_heading=self.measures_heading)
+        return Estimates(moved.state, moved.covariance + effect @ independent @ transposed(effect))
 
     def update(self, tracks: Estimates, boxes: Array, noise: Array) -> Update:
         return self._base.update(tracks, boxes, noise)
@@ -149,8 +160,7 @@ class UncertainPose(MotionModel):
     def _shifted(self, tracks: Estimates, pose: PoseUncertainty, sign: float) -> Estimates:
         """Return the tracks with the effect of the pose error on their position and heading added or subtracted."""
         shift: Array = np.broadcast_to(np.eye(self.size), tracks.covariance.shape).copy()
-        shift[:, :2, -3:] = sign * pose_jacobian(tracks.state[:, :2], pose.x, pose.y)
-        if self.measures_heading:
-            shift[:, HEADING, -1] = sign
+        effect = pose_effect(tracks.state, pose, measures_heading=self.measures_heading)
+        shift[:, :-3, -3:] = sign * effect[:, :-3]
         state = np.einsum("nij,nj->ni", shift, tracks.state)
         return Estimates(state, shift @ tracks.covariance @ transposed(shift))

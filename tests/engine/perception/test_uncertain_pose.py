@@ -82,7 +82,15 @@ class NoisyDetector(Detector):
         assert readings.truth is not None
         boxes = readings.truth.boxes.copy()
         boxes[:, :2] += self._random.normal(0.0, 0.1, (len(boxes), 2))
-        return Detections(readings.time, boxes, np.full(1, 0.9), ("car",), UNKNOWN, NOISE)
+        count = len(boxes)
+        return Detections(
+            readings.time,
+            boxes,
+            np.full(count, 0.9),
+            ("car",) * count,
+            np.repeat(UNKNOWN, count, 0),
+            np.repeat(NOISE, count, 0),
+        )
 
 
 @pytest.mark.exhaustive
@@ -113,3 +121,31 @@ def test_parked_car_is_tracked_consistently(kind: str, span: float) -> None:
     assert len(squared) == 540
     assert 1.5 < np.mean(squared) < 2.5
     assert np.mean(speeds) < 0.2
+
+
+@pytest.mark.parametrize("kind", ["cv", "ctrv"])
+def test_tracks_that_share_strong_yaw_errors_are_consistent(kind: str) -> None:
+    """NEES as above, 2 on average, with errors of the yaw of 2°, 1.4 m at the farthest car. What the boxes of other
+    cars show of the pose error cannot make a covariance negative."""
+    cars = np.repeat(CAR, 4, axis=0)
+    cars[:, :2] = (45.0, 2.0), (25.0, -4.0), (-35.0, 2.0), (5.0, 31.0)
+    truth = TruthReading(tuple("ABCD"), ("car",) * 4, cars, np.zeros((4, 2)), np.ones(4))
+    squared = []
+    for seed in range(2):
+        noise = PoseNoiseProcess(PoseNoise(position=0.1, yaw=2.0, correlation_time=0.1), "RSU", seed)
+        tracker = Tracker(TrackerSettings.model_validate({"kind": kind}))
+        perception = Perception(NoisyDetector(), tracker=tracker, pose_noise=noise)
+        for tick in range(100):
+            now = 0.1 * tick
+            ego = EgoState(now, np.array([*STATION, 0.0]), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            tracks = perception.perceive(perception.locate(Readings(now, ego, truth=truth)))
+            assert tracks is not None
+            assert np.linalg.eigvalsh(tracker._tracks.covariance).min(initial=0.0) > -1e-9
+            x, y, yaw = noise.error(now).tolist()
+            turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+            errors = tracks.boxes[:, None, :2] - (np.add(STATION, (x, y)) + (cars[:, :2] - STATION) @ turn.T)
+            nearest = errors[np.arange(len(tracks)), np.square(errors).sum(axis=2).argmin(axis=1)]
+            if tick >= 30:
+                squared += np.einsum("ni,nij,nj->n", nearest, np.linalg.inv(tracks.covariance), nearest).tolist()
+    assert len(squared) >= 500
+    assert 1.5 < np.mean(squared) < 2.5
