@@ -152,7 +152,8 @@ class RadioChannel(QueuedChannel):
             self._last_arrival = previous._last_arrival
 
     def finalize(self) -> None:
-        self._advance(math.inf)
+        if self._until is not None:  # before the first tick there is nothing to determine
+            self._advance(math.inf)
         self._counters.flush_into(self._links)
 
     def drain_events(self) -> Sequence[LinkEvent]:

@@ -157,6 +157,15 @@ def test_continue_from_radio_channel_keeps_its_queued_messages() -> None:
     assert (link.sent, link.received, link.lost, link.in_flight) == (2, 1, 1, 0)
 
 
+@pytest.mark.parametrize("technology", ["80211p", "cv2x_mode4", "nr_v2x_mode2"])
+def test_radio_channel_replaced_before_its_first_tick_has_no_effect(technology: str) -> None:
+    new = radio(1, technology=technology, **QUIET)
+    new.continue_from(radio(2, technology=technology, **QUIET))
+    events, deliveries = exchange(new, ROW, 10)
+    assert events == exchange(radio(1, technology=technology, **QUIET), ROW, 10)[0]
+    assert deliveries
+
+
 def test_transmit_of_a_station_without_antenna_position_raises() -> None:
     with pytest.raises(ValueError, match="station 'A' has no antenna position"):
         radio().transmit([(message("A", 0, 0.0), ["B"])], 0.0)
