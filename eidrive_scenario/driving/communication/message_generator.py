@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -108,6 +109,8 @@ class MessageGenerator:
         kinds = self._settings.messages
         if len(kinds) > 1:
             kinds = tuple(sorted(kinds, key=lambda kind: (self._last_generated[kind], kind)))
+        # Also while no message is due: without velocities, ids are kept from one list of detections to the next
+        numbers = self._numbering.assign_ids(detections) if etsi and "cpm" in kinds else ()
         for kind in kinds:
             if etsi and interval > 0.0 and now - max(self._last_generated.values()) < interval - EQUAL:
                 break
@@ -115,7 +118,7 @@ class MessageGenerator:
             messages: list[Message] = []
             if kind == "cpm":
                 if etsi:
-                    messages = self._triggered_cpms(state, detections, now, shortest)
+                    messages = self._triggered_cpms(state, detections, numbers, now, shortest)
                 else:  # an empty CPM states that no object is in sight
                     messages = [self._message(state, detections, now, lists_sensors=True)]
             elif not etsi or self._cam_rules.is_due(state, now, shortest):
@@ -163,10 +166,9 @@ class MessageGenerator:
         return True
 
     def _triggered_cpms(
-        self, state: StationState, detections: Detections, now: float, shortest: float
+        self, state: StationState, detections: Detections, numbers: Sequence[int], now: float, shortest: float
     ) -> list[Message]:
         """Return the CPMs with the objects that the ETSI rules select, segmented by the MTU."""
-        numbers = self._numbering.assign_ids(detections)
         contents = self._cpm_rules.contents(detections, numbers, now, shortest)
         if contents is None:
             return []

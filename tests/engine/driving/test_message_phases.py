@@ -118,3 +118,21 @@ def test_message_at_a_multiple_of_the_time_step_has_no_offset() -> None:
             now = tick * 0.05
             found += generator.generate(StationState(now, 0.0, 0.0, 0.0, 0.0, 0.0), Detections(now), now)
         assert [message.offset for message in found] == pytest.approx([expected])
+
+
+@pytest.mark.parametrize("interval", [0.0, 0.4, 1.0])
+def test_object_without_tracker_keeps_its_id_at_any_message_interval(interval: float) -> None:
+    """10 m/s are 1 m from one list of detections to the next, and 10 m in a second of congestion control."""
+    spec = ActorSpec("RSU", "rsu", "misc", (0.3, 0.3, 5.0), (0.0, 0.0, 2.5))
+    settings = AgentSettings.model_validate({"generation": "etsi", "message_phase": 0.0})
+    message_generator = MessageGenerator(spec, settings, dt=0.1)
+    ids = []
+    for tick in range(40):
+        now, unknown = 0.1 * tick, np.full((1, 2), np.nan)
+        boxes = np.array([[10.0 * now, 0.0, 0.75, 4.5, 1.8, 1.5, 0.0]])
+        seen = Detections(now, boxes, np.ones(1), ("car",), unknown, np.full((1, 2, 2), np.nan))
+        state = StationState(now, 0.0, 0.0, 0.0, 0.0, 0.0)
+        for message in message_generator.generate(state, seen, now, interval=interval):
+            ids += message.objects or ()
+    assert len(ids) >= 4
+    assert set(ids) == {0}
