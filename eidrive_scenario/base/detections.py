@@ -73,6 +73,24 @@ class Detections(msgspec.Struct, frozen=True, gc=False):
     def __len__(self) -> int:
         return len(self.boxes)
 
+    @classmethod
+    def concatenate(cls, time: float, parts: Sequence[Detections]) -> Detections:
+        """Return the objects of all parts as those of `time` [s]; the parts have the same kind of velocities."""
+        if not parts:
+            return cls(time)
+        is_estimated = any(len(part.existence) for part in parts)
+        return cls(
+            time,
+            np.concatenate([part.boxes for part in parts]),
+            np.concatenate([part.scores for part in parts]),
+            tuple([name for part in parts for name in part.classes]),
+            np.concatenate([part.velocity for part in parts]),
+            np.concatenate([part.covariance for part in parts]),
+            tuple([number for part in parts for number in part.tracks]),
+            np.concatenate([part.confidence for part in parts]) if is_estimated else NOT_ESTIMATED,
+            parts[-1].velocity_deviation,
+        )
+
     def move(self, before: Array, after: Array, turn: float) -> Detections:
         """Return the detections of a station as it reports them from another pose.
 

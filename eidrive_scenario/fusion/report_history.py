@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.fusion.pairs import AssociationGate, Table, ranges
 from eidrive_scenario.fusion.tracks import TRACK, Rows, rows_of, update_tracks
@@ -224,16 +225,7 @@ def _joined(first: Report, second: Report) -> Report:
     if len(other) > len(other.tracks):  # without ids, objects of both reports cannot be told apart
         return second
     rest = one.subset([row for row, number in enumerate(one.tracks) if number not in other.tracks])
-    detections = msgspec.structs.replace(
-        other,
-        classes=rest.classes + other.classes,
-        tracks=rest.tracks + other.tracks,
-        existence=np.concatenate([rest.confidence, other.confidence]),
-        **{
-            name: np.concatenate([getattr(rest, name), getattr(other, name)])
-            for name in ("boxes", "scores", "velocity", "covariance")
-        },
-    )
+    detections = Detections.concatenate(other.time, [rest, other])
     return msgspec.structs.replace(second, detections=detections)
 
 

@@ -107,11 +107,10 @@ def _converted(reports: Sequence[Report]) -> Table:
     table["mean"][:, :2] = boxes[:, :2]
     table["body"] = boxes[:, 2:6]
     table["score"] = table["weight"] = table["existence"] = np.minimum(np.maximum(scores, 0.0), 1.0)
-    if any([detections.existence is not NOT_ESTIMATED or detections.tracks for detections in lists]):
+    if any([detections.existence is not NOT_ESTIMATED for detections in lists]):
         existence = np.concatenate([detections.confidence for detections in lists])
         table["existence"] = np.minimum(np.maximum(existence, 0.0), 1.0)
-        judged = [len(detections.existence) > 0 or len(detections.tracks) > 0 for detections in lists]
-        table["judged"] = np.repeat(judged, counts)
+        table["judged"] = np.repeat([len(detections.existence) > 0 for detections in lists], counts)
     moving = np.isfinite(velocity[:, 0] + velocity[:, 1])
     table["moving"] = moving
     table["mean"][:, 2:] = np.where(moving[:, None], velocity, 0.0)

@@ -72,24 +72,11 @@ class PartialReportAssembler:
             for number, known_object in sorted(self._objects.items())
             if time - known_object.time <= self._timeout
         }
-        if not self._objects:
-            return Detections(time)
         objects = [*self._objects.values()]
-        boxes = np.concatenate([known_object.boxes for known_object in objects])
-        velocity = np.concatenate([known_object.velocity for known_object in objects])
+        known = Detections.concatenate(time, objects)
         age = time - np.array([known_object.time for known_object in objects])
-        boxes[:, :2] += np.nan_to_num(velocity) * age[:, None]
-        return Detections(
-            time,
-            boxes,
-            np.concatenate([known_object.scores for known_object in objects]),
-            tuple(known_object.classes[0] for known_object in objects),
-            velocity,
-            np.concatenate([known_object.covariance for known_object in objects]),
-            tuple(self._objects),
-            np.concatenate([known_object.confidence for known_object in objects]),
-            detections.velocity_deviation,
-        )
+        known.boxes[:, :2] += np.nan_to_num(known.velocity) * age[:, None]
+        return known
 
 
 REGION_LIFETIME = 1.0

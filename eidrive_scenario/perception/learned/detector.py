@@ -252,15 +252,4 @@ def most_certain(estimates: Sequence[Detections]) -> Detections:
 
 def merge_duplicates(parts: list[Detections], time: float) -> Detections:
     """Return all detections except those that overlap one with a higher score."""
-    parts = [part for part in parts if len(part)]
-    if not parts:
-        return Detections(time)
-    merged = Detections(
-        time,
-        np.concatenate([part.boxes for part in parts]),
-        np.concatenate([part.scores for part in parts]),
-        tuple(name for part in parts for name in part.classes),
-        np.concatenate([part.velocity for part in parts]),
-        np.concatenate([part.covariance for part in parts]),
-    )
-    return without_duplicates(merged)
+    return without_duplicates(Detections.concatenate(time, parts))

@@ -241,7 +241,8 @@ def test_fuse_keeps_objects_omitted_in_incomplete_reports(report: Make, fuse: Fu
 
 def test_fuse_associates_reports_by_object_id(report: Make, fuse: Fuse) -> None:
     one, two = (report("A", time, [(x, 0.0)], tracks=(7,), covariance=0.01) for time, x in ((0.0, 0.0), (0.1, 9.0)))
-    assert len(fuse([one, two], 0.1)) == 1
+    tracked = [replace(held, detections=replace(held.detections, existence=np.full(1, 0.9))) for held in (one, two)]
+    assert len(fuse(tracked, 0.1)) == 1
 
 
 def test_fuse_deletes_tracks_after_the_maximum_age(report: Make, fuse: Fuse) -> None:

@@ -89,9 +89,16 @@ def test_existence_after_missed_detection_equals_that_of_the_tracker(report: Mak
     assert found[0] == pytest.approx(float(missed(np.array(0.9 * np.exp(-0.1 / LIFETIME)))), rel=1e-6)
 
 
-def test_existence_after_second_detection_equals_hand_calculation(report: Make, fuse: Fuse) -> None:
-    """r L / (1 - r + r L) with r = 0.8 exp(-0.01), L = 0.1 + 4 / (0.01 · 2 pi S), S = 0.082 + 0.01 · 12² m²."""
-    reports = [report("A", time, [(0.0, 0.0)], velocity=(np.nan, np.nan), score=0.8) for time in (0.0, 0.1)]
+@pytest.mark.parametrize("has_ids", [False, True])
+def test_existence_after_second_detection_equals_hand_calculation(report: Make, fuse: Fuse, has_ids: bool) -> None:
+    """r L / (1 - r + r L) with r = 0.8 exp(-0.01), L = 0.1 + 4 / (0.01 · 2 pi S), S = 0.082 + 0.01 · 12² m².
+
+    Ids of objects in segments of CPMs are no tracker."""
+    reports = [
+        report("A", time, [(x, 0.0)], score=0.8, tracks=(number,) if has_ids else (), complete=not has_ids)
+        for time in (0.0, 0.1)
+        for x, number in ([(0.0, 1), (90.0, 2)] if has_ids else [(0.0, 1)])
+    ]
     before, ratio = 0.8 * np.exp(-0.01), 0.1 + 4.0 / (0.01 * 2.0 * np.pi * (0.082 + 0.01 * 12.0**2))
     expected = before * ratio / (1.0 - before + before * ratio)
     assert fuse(reports, 0.1).existence[0] == pytest.approx(expected, abs=1e-9)
