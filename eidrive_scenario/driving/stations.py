@@ -311,11 +311,11 @@ class Stations(DrivingStack):
         if view is self._perceived_view:
             return self._perceived
         self._readings, self._perceived = {}, {}
-        if not self._agents:
-            return {}
-        if self._channel.active is not None:
+        if self._channel.has_links:
             antennas = [(agent.spec, agent.settings.antenna_height) for agent in self._agents.values()]
             self._channel.update_environment(radio_environment(world, view, antennas, self._context.roads))
+        if not self._agents:
+            return {}
         self._readings = readings = read_stations(self._rigs, self._signal_sensors, world, view, inputs.signals)
         prepare_detectors(self._agents, readings)
         now, channel, own_perception = view.time, self._channel, self._channel.own_perception

@@ -246,3 +246,23 @@ def test_message_numbers_continue_after_the_sender_enters_again() -> None:
             numbers += [link.number for link in frame.links if link.sender == "RSU"]
     assert numbers == list(range(len(numbers)))
     assert len(numbers) in (19, 20, 21)
+
+
+@pytest.mark.parametrize("switched_off", [False, True])
+def test_messages_in_flight_are_lost_when_all_stations_leave(switched_off: bool) -> None:
+    """With a delay of 0.3 s and a message in each tick of 0.05 s, six messages of each link are in flight."""
+    with Simulation(load_for_seed(ONE, 1, {}), seed=1) as simulation:
+        stack = simulation.stack
+        assert isinstance(stack, Stations)
+        list(stack.request_channel("{delay: {kind: constant, seconds: 0.3}}", source="test", line=1))
+        for _ in range(10):
+            frame, _ = simulation.tick()
+        if switched_off:
+            list(stack.request_channel("none", source="test", line=2))
+        names = set(frame.steps)
+        for name in names:
+            stack.remove(name)
+        frame, _ = simulation.tick()
+    links = stack.link_statistics(frame.view.time).values()
+    assert len(links) >= 1
+    assert {(link.in_flight, *link.lost_by.items()) for link in links} == {(0, ("absent", 6))}

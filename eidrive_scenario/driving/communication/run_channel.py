@@ -12,7 +12,7 @@ import numpy as np
 
 from eidrive_scenario.errors import InvalidResult, SettingError
 from eidrive_scenario.openscenario.values.parameters import Scope
-from eidrive_scenario.v2x.channel import Channel, OutgoingMessage
+from eidrive_scenario.v2x.channel import Channel, OutgoingMessage, QueuedChannel
 from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
 from eidrive_scenario.v2x.profile import NO_COOPERATION, ChannelProfile, build_channel, load_profile
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
@@ -52,10 +52,17 @@ class RunChannel:
             self.active = build_channel(profile, self._seed, previous=self._last)
         except SettingError as error:
             raise error.at(origin, line) from error
+        if self.active is None and isinstance(self._last, QueuedChannel):
+            self._last.finalize()  # with the places of the stations at the end of cooperation
         self._last = self.active or self._last
         self._statistics = None
         self.profile = profile
         self.name = profile.name if profile is not None else NO_COOPERATION
+
+    @property
+    def has_links(self) -> bool:
+        """Whether there was a channel, whose messages in flight are lost if their receiver leaves."""
+        return self._last is not None
 
     @property
     def own_perception(self) -> bool:
@@ -64,9 +71,9 @@ class RunChannel:
 
     def update_environment(self, environment: RadioEnvironment) -> None:
         """Set antenna positions and obstacles of this tick."""
-        if self.active is not None:
+        if self._last is not None:
             self._statistics = None
-            self.active.update_environment(environment)
+            self._last.update_environment(environment)
 
     def min_message_interval(self, sender: str) -> float:
         """Return the minimum time between two messages of a station under congestion control [s]."""
