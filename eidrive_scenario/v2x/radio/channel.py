@@ -187,7 +187,8 @@ class RadioChannel(QueuedChannel):
         self._jitter_keys = [key(self._seed, "jitter", name) for name in names]
         if self._fading is not None:
             self._fading.rearrange(names)
-        for transmission in [*lost, *gone]:
+        # Of a message that is transmitted again, the last transmission has all receivers without an outcome
+        for transmission in [*lost, *(transmission for transmission in gone if not transmission.later)]:
             for receiver in transmission.undecided:
                 self._dropped.append(self._links.lose(transmission.message, receiver, transmission.sent, ABSENT))
 

@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from radio_traffic import radio
+from radio_traffic import message, radio
 from sidelink_traffic import MODE_2, TWO, Air, many
 
 from eidrive_scenario.errors import SettingError
+from eidrive_scenario.v2x.messages.message import LinkEvent
 from eidrive_scenario.v2x.profile import load_profile
 from eidrive_scenario.v2x.radio.nr_physical_layer import transport_block_bits
 from eidrive_scenario.v2x.radio.packet_error import coded_curve, coded_errors
 from eidrive_scenario.v2x.radio.resource_pool import NrSidelinkSettings
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 
 
 @pytest.mark.parametrize(
@@ -110,6 +112,20 @@ def test_independent_transmissions_lose_the_product_of_their_error_rates() -> No
     assert 0.3 < lost[0] < 0.9
     assert lost[1] == pytest.approx(lost[0] ** 2, abs=0.03)
     assert lost[2] == pytest.approx(lost[0] ** 3, abs=0.03)
+
+
+def test_message_of_a_sender_that_leaves_between_transmissions_is_lost_once() -> None:
+    places = {"A": (0.0, 0.0, 1.5), "B": (100.0, 0.0, 1.5)}
+    for seed in range(60):
+        carrier = radio(seed, **MODE_2, nr_sidelink={"transmissions": 2})
+        events: list[LinkEvent] = []
+        for tick in range(4):
+            carrier.update_environment(RadioEnvironment(places if tick < 2 else {"B": places["B"]}))
+            outbox = [(message("A", tick, tick * 0.05, 8000), ["B"])] if tick < 2 else []
+            events += carrier.transmit(outbox, tick * 0.05)
+        carrier.deliver("B", 1.0)
+        assert sorted(event.number for event in events) == [0, 1]
+        assert carrier.statistics(1.0)["A", "B"].in_flight == 0
 
 
 @pytest.mark.parametrize(
