@@ -179,7 +179,8 @@ class TruncatedNormalDelay(Settings):
         from scipy.special import ndtri
 
         low, high = self._mass
-        delay = self.mean + self.sd * float(ndtri(low + u * (high - low)))
+        probability = min(low + u * (high - low), math.nextafter(1.0, 0.0))  # far in the tail it rounds to 1
+        delay = self.mean + self.sd * float(ndtri(probability))
         return min(max(delay, self.minimum), math.inf if self.maximum is None else self.maximum)
 
 

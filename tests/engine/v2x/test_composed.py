@@ -106,6 +106,12 @@ DISTRIBUTIONS = [
         0.1 * math.sqrt(2 / math.pi),
         0.1 * math.sqrt(1 - 2 / math.pi),
     ),
+    # far in the tail, at z = 7 standard deviations, the hazard h = 7.137546: mean h, variance 1 + z h - h²
+    (
+        {"kind": "truncated_normal", "mean": 0.0, "sd": 0.01, "minimum": 0.07},
+        0.01 * 7.137546,
+        0.01 * math.sqrt(1.0 + 7.0 * 7.137546 - 7.137546**2),
+    ),
 ]
 
 
