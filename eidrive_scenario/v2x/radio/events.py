@@ -173,4 +173,4 @@ class LinkCounterTable:
         ):
             counters[link].count_outcomes(distance_class, losses + deliveries, deliveries)
         for counts in (self._sent, self._bytes, self._causes, self._outcomes):
-            counts[...] = 0
+            counts[..., senders, receivers] = 0  # not all links: these are many, and few of them changed
