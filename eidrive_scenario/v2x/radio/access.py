@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
@@ -100,6 +100,8 @@ class MediumAccess(ABC):
         """Index of the current period of congestion control; None before the first message."""
         self.fading: FadingDraws | None = None
         """Fading of each message at each station; None: power of the link budget."""
+        self.senses_jammer: Bools | None = None
+        """Stations (N,) whose channel jammers occupy all the time; None without a jammer."""
         self.power = np.zeros((0, 0))
         """Received power (N, N) of the last `advance` [dBm]."""
         self.active: list[Transmission] = []
@@ -115,9 +117,9 @@ class MediumAccess(ABC):
         )
 
     @property
-    def waiting(self) -> list[Transmission]:
-        """Transmissions that have not started."""
-        return [*self._arrivals, *(transmission for queue in self._waiting for transmission in queue)]
+    def is_waiting(self) -> bool:
+        """Whether any transmission has not started."""
+        return bool(self._arrivals) or self.contending > 0
 
     def advance(self, until: float, power: Array) -> tuple[list[Transmission], list[Transmission]]:
         """Simulate the medium up to `until` [s]; return started and dropped transmissions.
@@ -184,12 +186,8 @@ class MediumAccess(ABC):
     def rearrange(self, names: tuple[str, ...]) -> list[Transmission]:
         """Replace the stations; return the pending transmissions of removed stations."""
         rows = [self._rows.get(name) for name in names]
-        gone = [name for name in self.names if name not in names]
-        lost = [transmission for name in gone for transmission in self._waiting[self._rows[name]]]
-        lost += [transmission for transmission in self._arrivals if transmission.message.sender in gone]
-        self._arrivals = deque(
-            transmission for transmission in self._arrivals if transmission.message.sender not in gone
-        )
+        gone = set(self.names).difference(names)
+        lost = self.withdraw(gone)
         self._waiting = [deque() if old is None else self._waiting[old] for old in rows]
         self._head = [None if old is None else self._head[old] for old in rows]
         self.contending = sum(head is not None for head in self._head)
@@ -202,6 +200,19 @@ class MediumAccess(ABC):
         self.names, self._rows = names, {name: row for row, name in enumerate(names)}
         self.reorder(rows)
         return lost
+
+    def withdraw(self, senders: Collection[str]) -> list[Transmission]:
+        """Remove the pending transmissions of present stations, and return them."""
+        rows = [row for name, row in self._rows.items() if name in senders and self._waiting[row]]
+        pending = [transmission for row in rows for transmission in self._waiting[row]]
+        pending += [transmission for transmission in self._arrivals if transmission.message.sender in senders]
+        self._arrivals = deque(
+            transmission for transmission in self._arrivals if transmission.message.sender not in senders
+        )
+        for row in rows:
+            self._waiting[row].clear()
+            self._contend_next(row)
+        return pending
 
     @abstractmethod
     def reorder(self, rows: Sequence[int | None]) -> None:
@@ -259,7 +270,8 @@ class MediumAccess(ABC):
             self._period = math.floor(now / period + 1e-6)
         while now >= (self._period + 1) * period - TIME_TOLERANCE:
             self._busy_time += self._period_busy
-            self.gate.update(self._period_ratio(period))
+            ratio = self._period_ratio(period)
+            self.gate.update(ratio if self.senses_jammer is None else np.where(self.senses_jammer, 1.0, ratio))
             self._period_busy = np.zeros(len(self.names))
             self._period += 1
 

@@ -73,6 +73,7 @@ class RadioChannel(QueuedChannel):
         self._budget: Budget | None = None
         self._jamming: Array | None = None
         """Power of all jammers at the stations (N,) [mW], in the order of their names; None without a jammer."""
+        self._senses_jammer = np.zeros(0, dtype=np.bool_)
         self._jammed: frozenset[str] = frozenset()
         """Stations that sense a channel which jammers occupy, and so do not transmit."""
         self._open: list[Transmission] = []
@@ -89,8 +90,8 @@ class RadioChannel(QueuedChannel):
         if not self.profile.jammers:
             return
         self._jamming = self.profile.jamming_power(surroundings.positions)
-        senses = self._jamming >= 10.0 ** (ENERGY_DETECTION_DBM / 10.0)
-        self._jammed = frozenset(surroundings.names[row] for row in np.flatnonzero(senses).tolist())
+        self._senses_jammer = self._jamming >= 10.0 ** (ENERGY_DETECTION_DBM / 10.0)
+        self._jammed = frozenset(surroundings.names[row] for row in np.flatnonzero(self._senses_jammer).tolist())
 
     def send(self, message: Message, receivers: Sequence[str], now: float) -> Sequence[LinkEvent]:
         return self.transmit([(message, receivers)], now)
@@ -200,11 +201,15 @@ class RadioChannel(QueuedChannel):
             self._set_stations(self.surroundings.names, self._until)
         if now <= self._until:
             return
+        if self._jamming is not None:
+            self._access.senses_jammer = self._senses_jammer
+            for transmission in self._access.withdraw(self._jammed):
+                self._drop(transmission)
         if math.isfinite(now):
             self._until = now
         if self._budget is None:  # also without transmissions: shadowing must not depend on when stations transmit
             self._budget = self._link_budget.at(self.surroundings)
-        if not self._open and not self._access.waiting:
+        if not self._open and not self._access.is_waiting:
             self._access.rest(now)
             return
         if self._fading is not None:

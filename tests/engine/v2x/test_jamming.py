@@ -64,6 +64,21 @@ def test_station_near_the_jammer_does_not_transmit() -> None:
     assert statistics["B", "A"].lost_by == {"queue": 10}
 
 
+def test_station_that_comes_near_the_jammer_drops_its_queue() -> None:
+    """From 1 s on B is near the jammer: its channel is busy all the time, for which table A.1 has 1 s."""
+    carrier = radio(1, **FREE, **jammer(1100.0, 10.0), congestion={"kind": "reactive"})
+    outcomes = {}
+    for tick in range(40):
+        x = 100.0 if tick < 20 else 1090.0
+        carrier.update_environment(RadioEnvironment({"A": (x - 20.0, 0.0, 1.5), "B": (x, 0.0, 1.5)}))
+        outbox = [(message("B", tick, tick * DT), ["A"])] if tick < 20 else []
+        outcomes.update({event.number: event for event in carrier.transmit(outbox, tick * DT)})
+    assert all(event.arrives is None or event.arrives <= 20 * DT for event in outcomes.values())
+    assert {event.reason for event in outcomes.values() if event.outcome == "lost"} == {"queue"}
+    assert len(outcomes) == 20
+    assert carrier.min_message_interval("B") == 1.0
+
+
 def test_jammer_that_ends_restores_the_link() -> None:
     jammed = radio(1, **FREE, **jammer(110.0, 10.0))
     exchange(jammed, PLACES, 10)
