@@ -176,6 +176,8 @@ class AgentSettings(Settings):
             raise ValueError(f"generation {self.generation!r} and a message_rate exclude each other")
         if self.message_phase is not None and self.generation != "etsi" and self.message_rate is None:
             raise ValueError("message_phase needs a message_rate or generation 'etsi'")
+        if self.security_bytes >= self.mtu:
+            raise ValueError(f"security_bytes is not below mtu (got {self.security_bytes} and {self.mtu} bytes)")
         return self
 
     @model_validator(mode="after")
