@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from numbers import Real
 from typing import Any
 
 from eidrive_scenario.driving.agent import Agent
@@ -11,7 +12,7 @@ from eidrive_scenario.driving.control.vehicle_controller import VehicleControlle
 from eidrive_scenario.driving.planner_settings import DEFAULT_PLANNER, NO_PLANNER
 from eidrive_scenario.driving.planning.route_planner import Planner
 from eidrive_scenario.driving.settings import SELECTED, AgentSettings
-from eidrive_scenario.errors import Diagnostic, RegistryError, SettingError
+from eidrive_scenario.errors import Diagnostic, InvalidResult, RegistryError, SettingError
 from eidrive_scenario.extensions.registry import construct, registry
 from eidrive_scenario.extensions.settings import Settings, parse_own_settings
 from eidrive_scenario.fusion.method import FusionMethod
@@ -86,7 +87,17 @@ def build_fusion(
         method = f"fusion method {settings.fusion!r}"
         message = f"{method} shares {kind.shares}, which detector {settings.detector!r} {lacks}"
         raise SettingError(Diagnostic(message, f"select a detector that {suitable}", source, line))
-    return construct(kind, *own)  # type: ignore[no-any-return]
+    fusion: FusionMethod = construct(kind, *own)
+    longest: object = fusion.max_report_age
+    if not isinstance(longest, Real) or not float(longest) >= 0.0:
+        raise InvalidResult(fusion, "max_report_age", f"is {longest!r} (expected a number of at least 0 s)")
+    if 0.0 < float(longest) <= settings.detector_latency:
+        ages = f"(got {settings.detector_latency:g} s and {float(longest):.3g} s)"
+        message = (
+            f"detector_latency is not below the maximum age of reports of fusion method {settings.fusion!r} {ages}"
+        )
+        raise SettingError(Diagnostic(message, source=source, line=line))
+    return fusion
 
 
 def build_agent(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from numbers import Real
 
 import numpy as np
 from msgspec.structs import replace
@@ -224,10 +223,7 @@ class ReportStore:
         self._sharing = sharing
         self._reports: dict[str, Report] = {}
         self._partial: dict[str, PartialReportAssembler] = {}
-        longest: object = fusion.max_report_age
-        if not isinstance(longest, Real) or not float(longest) >= 0.0:
-            raise InvalidResult(fusion, "max_report_age", f"is {longest!r} (expected a number of at least 0 s)")
-        self._lifetime = min(settings.report_lifetime, float(longest))
+        self._lifetime = min(settings.report_lifetime, fusion.max_report_age)
         """Maximum age of a report that is used [s]."""
         self._next_deletion = math.inf
         """Time up to which no report exceeds its lifetime [s]."""

@@ -108,6 +108,20 @@ def test_detector_latency_above_report_timeout_is_error(write: Write) -> None:
     assert "detector_latency is not below report_timeout (got 2.5 s and 2.28 s)" in diagnostic
 
 
+def test_security_envelope_of_the_maximum_size_is_error(write: Write) -> None:
+    (diagnostic,) = diagnostics_of(write(security_bytes="1400"))
+    assert "security_bytes is not below mtu (got 1400 and 1400 bytes)" in diagnostic
+
+
+def test_detector_latency_above_maximum_age_of_fusion_is_error(write: Write) -> None:
+    path = write(detector_latency="0.5", fusion_settings="{max_age: 0.3}")
+    path.write_text(
+        path.read_text().replace('name="fusion" value="average"', 'name="fusion" value="covariance_intersection"')
+    )
+    (diagnostic,) = diagnostics_of(path)
+    assert "maximum age of reports of fusion method 'covariance_intersection' (got 0.5 s and 0.3 s)" in diagnostic
+
+
 def test_invalid_detector_settings_are_errors_with_line(write: Write) -> None:
     path = write(rsu=True, detector_settings="{min_points: 0, of_road: 3}")
     text = path.read_text().replace(
