@@ -105,8 +105,9 @@ class PerceptionRegionStore:
             placed = tuple([sector.placed(*pose) for sector in sectors])
             self._regions[station] = PerceptionRegion(station, time, placed)
 
-    def add_message(self, message: Message) -> None:
-        """Store the region of a CPM. Without information about the sensors of its sender it has none.
+    def add_message(self, message: Message, arrived: float) -> None:
+        """Store the region of a CPM, which is not later than its arrival, also if the clock of its sender is fast.
+        Without information about the sensors of its sender it has none.
 
         The message has the pose of the sender at its generation; since the measurement it drove straight on.
         """
@@ -119,7 +120,7 @@ class PerceptionRegionStore:
             state, time = message.state, message.detections.time
             driven = state.speed * (state.time - time)
             x, y = state.x - driven * math.cos(state.yaw), state.y - driven * math.sin(state.yaw)
-            self.add(message.sender, time, (x, y, state.z, state.yaw), sectors)
+            self.add(message.sender, min(time, arrived), (x, y, state.z, state.yaw), sectors)
 
     def newest(self, now: float) -> tuple[PerceptionRegion, ...]:
         """Return the regions that do not exceed the lifetime at `now` [s], one for each station."""
@@ -258,7 +259,7 @@ class ReportStore:
             if own and not (own_perception and perceived):
                 continue
             if regions is not None:
-                regions.add_message(message)
+                regions.add_message(message, received.arrived)
             payload = message.payload
             if sharing is not None and payload is not None and sharing.accepts(payload) and not own:
                 longest = self._fusion.max_payload_age

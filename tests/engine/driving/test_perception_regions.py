@@ -50,7 +50,7 @@ def sent(agent: Agent, seconds: float) -> list[Message]:
 
 def test_region_is_placed_at_the_pose_of_the_sender() -> None:
     store = PerceptionRegionStore()
-    store.add_message(cpm(2.0, sensors=(AHEAD,), yaw=math.pi / 2.0))
+    store.add_message(cpm(2.0, sensors=(AHEAD,), yaw=math.pi / 2.0), 2.0)
     (region,) = store.newest(2.3)
     (sector,) = region.sectors
     assert (region.station, region.time) == ("Helper", 2.0)
@@ -61,26 +61,33 @@ def test_region_is_placed_at_the_pose_of_the_sender() -> None:
 
 def test_sensor_information_applies_to_later_messages_at_their_pose() -> None:
     store = PerceptionRegionStore()
-    store.add_message(cpm(1.0, sensors=None))
+    store.add_message(cpm(1.0, sensors=None), 1.0)
     assert store.newest(1.0) == (), "a sender without sensor information has no region"
-    store.add_message(cpm(1.1, sensors=(AHEAD,)))
-    store.add_message(cpm(1.2, sensors=None, x=30.0))
+    store.add_message(cpm(1.1, sensors=(AHEAD,)), 1.1)
+    store.add_message(cpm(1.2, sensors=None, x=30.0), 1.2)
     (region,) = store.newest(1.2)
     assert (region.time, region.sectors[0].x) == (1.2, 32.0)
 
 
 def test_region_expires_and_is_not_replaced_by_an_older_one() -> None:
     store = PerceptionRegionStore()
-    store.add_message(cpm(2.0, sensors=(AHEAD,)))
-    store.add_message(cpm(1.5, sensors=(AHEAD,), x=90.0))
+    store.add_message(cpm(2.0, sensors=(AHEAD,)), 2.0)
+    store.add_message(cpm(1.5, sensors=(AHEAD,), x=90.0), 1.5)
     assert [region.sectors[0].x for region in store.newest(3.0)] == [12.0]
+    assert store.newest(3.1) == ()
+
+
+def test_region_of_a_fast_clock_expires_a_second_after_its_arrival() -> None:
+    store = PerceptionRegionStore()
+    store.add_message(cpm(7.0, sensors=(AHEAD,)), 2.0)
+    assert len(store.newest(3.0)) == 1
     assert store.newest(3.1) == ()
 
 
 def test_region_is_where_the_sender_was_at_its_measurement() -> None:
     """At 20 m/s along y it was 10 m back 0.5 s before."""
     store, message = PerceptionRegionStore(), cpm(2.0, sensors=(AHEAD,), yaw=math.pi / 2.0)
-    store.add_message(replace(message, state=replace(message.state, speed=20.0), detections=Detections(1.5)))
+    store.add_message(replace(message, state=replace(message.state, speed=20.0), detections=Detections(1.5)), 2.0)
     (region,) = store.newest(2.0)
     assert region.time == 1.5
     assert (region.sectors[0].x, region.sectors[0].y) == pytest.approx((10.0, 7.0 - 10.0))
@@ -89,13 +96,13 @@ def test_region_is_where_the_sender_was_at_its_measurement() -> None:
 def test_cam_has_no_region() -> None:
     store = PerceptionRegionStore()
     state = StationState(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    store.add_message(Message("Helper", 0, 1.0, state, Detections(1.0), 100, "cam", sensors=(AHEAD,)))
+    store.add_message(Message("Helper", 0, 1.0, state, Detections(1.0), 100, "cam", sensors=(AHEAD,)), 1.0)
     assert store.newest(1.0) == ()
 
 
 def test_station_without_sensors_covers_nothing() -> None:
     store = PerceptionRegionStore()
-    store.add_message(cpm(1.0, sensors=()))
+    store.add_message(cpm(1.0, sensors=()), 1.0)
     assert store.newest(1.0) == ()
 
 
@@ -115,6 +122,14 @@ def test_sensor_information_is_sent_once_per_second_by_the_rules_of_etsi() -> No
     times = [message.generated for message in messages if message.sensors is not None]
     assert np.diff(times).tolist() == pytest.approx([1.0] * (len(times) - 1), abs=0.05)
     assert len(times) >= 3
+
+
+@pytest.mark.parametrize("settings", [{}, {"generation": "etsi"}])
+def test_cpm_lists_sensors_from_the_first_result_of_the_detector_on(settings: dict[str, str]) -> None:
+    """Its sectors count as perceived: before, no object in them is reported."""
+    messages = sent(station(detector_latency=0.9, **settings), 2.5)
+    first = min(message.generated for message in messages if message.sensors is not None)
+    assert 0.9 <= first + 1e-9 <= 1.05
 
 
 def test_cpm_lists_only_sensors_that_perceive_objects() -> None:
