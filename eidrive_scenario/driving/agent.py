@@ -63,6 +63,7 @@ class Agent:
         self.sharing = sharing
         self.message_generator = message_generator
         self._detections: Detections | None = None
+        self._has_measured = False
         self._regions: PerceptionRegionStore | None = None
         if planner is not None and planner.observes_regions:
             self._regions = PerceptionRegionStore()
@@ -130,6 +131,7 @@ class Agent:
         fresh = self.perception.perceive(readings)
         if fresh is not None or self._detections is None:  # nothing is measured before the first detections
             self._detections = Detections(now) if fresh is None else fresh
+        self._has_measured = self._has_measured or fresh is not None
         detections = self._detections
         covariance = self.perception.pose_covariance
         expired = self._reports.process(inbox, now, ego, pose_covariance=covariance, own_perception=own_perception)
@@ -201,6 +203,7 @@ class Agent:
                 now,
                 () if self.sharing is None else self.sharing.own,
                 interval=perceived.message_interval,
+                has_measured=self._has_measured,
             )
             if action.send
             else (),

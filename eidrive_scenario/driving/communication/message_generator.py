@@ -89,6 +89,7 @@ class MessageGenerator:
         payloads: tuple[Payload, ...] = (),
         *,
         interval: float = 0.0,
+        has_measured: bool = True,
     ) -> tuple[Message, ...]:
         """Return the messages of this tick.
 
@@ -96,6 +97,8 @@ class MessageGenerator:
                   its own message
         interval  minimum time between two messages under congestion control [s], respected by the ETSI rules. With two
                   kinds of messages only the less recent kind is generated in a tick
+        has_measured  whether the detector has returned a result: before it, CPMs do not list sensors, whose sectors
+                  would count as perceived
         """
         if self._first == math.inf:
             self._first = now + self._phase
@@ -117,10 +120,12 @@ class MessageGenerator:
             shortest = max(interval, SHORTEST)
             messages: list[Message] = []
             if kind == "cpm":
+                if etsi and not has_measured:
+                    continue
                 if etsi:
                     messages = self._triggered_cpms(state, detections, numbers, now, shortest)
                 else:  # an empty CPM states that no object is in sight
-                    messages = [self._message(state, detections, now, lists_sensors=True)]
+                    messages = [self._message(state, detections, now, lists_sensors=has_measured)]
             elif not etsi or self._cam_rules.is_due(state, now, shortest):
                 low = self._cam_rules.low_frequency(now)
                 messages = [self._message(state, own_body(self._spec, state), now, "cam", low_frequency=low)]
