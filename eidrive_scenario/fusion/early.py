@@ -55,6 +55,8 @@ class EarlyFusion(CovarianceIntersectionFusion):
         super().__init__(settings)
         self._received: dict[str, tuple[float, Array]] = {}
         """Time and points (N, 3) of the newest cloud of each station."""
+        self._merged: dict[str, float] = {}
+        """Time of the newest cloud of each station that is merged with own points and not too old."""
         self._detector: Detector | None = None
 
     def setup(self, detector: Detector) -> None:
@@ -83,8 +85,10 @@ class EarlyFusion(CovarianceIntersectionFusion):
         """Return the readings with the received points added to those of the first lidar."""
         oldest = readings.time - self.max_payload_age - TIME_TOLERANCE
         self._received = {sender: held for sender, held in self._received.items() if held[0] >= oldest}
+        self._merged = {sender: time for sender, time in self._merged.items() if time >= oldest}
         if not readings.lidars or not self._received:
             return readings
+        self._merged = {sender: time for sender, (time, _) in self._received.items()}
         name, first = next(iter(readings.lidars.items()))
         own = [_surface_points(reading) for other, reading in readings.lidars.items() if other != name]
         received = [points for _, (_, points) in sorted(self._received.items())]
@@ -98,7 +102,7 @@ class EarlyFusion(CovarianceIntersectionFusion):
         one.
         """
         rows, ranks = super()._select(reports)
-        merged = np.array([station in self._received for station in self._order[1]], np.bool_)[ranks]
+        merged = np.array([station in self._merged for station in self._order[1]], np.bool_)[ranks]
         features = None if self._detector is None else self._detector.feature_map
         if features is not None and merged.any():
             merged &= Grid.of(features).cells(self._history.positions(rows))[1]
