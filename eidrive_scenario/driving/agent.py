@@ -22,6 +22,7 @@ from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.result_checks import check_detections, is_checked
 from eidrive_scenario.sensing.readings import EgoState, Readings
+from eidrive_scenario.sensing.settings import MIN_ROTATION
 from eidrive_scenario.v2x.messages.message import ReceivedMessage, StationState
 from eidrive_scenario.world.actor import ActorSpec, Control
 
@@ -69,7 +70,9 @@ class Agent:
             self._regions = PerceptionRegionStore()
             everywhere = ViewSector(*spec.offset, 0.0, math.pi, math.inf)
             self._view = (everywhere,) if planner.view is None else planner.view
-        self._own_body = OwnBody(spec, duration=settings.report_lifetime, dt=dt)
+        # Received points may be older than a report, and show the body during a revolution before
+        oldest = fusion.max_payload_age + (1.0 / MIN_ROTATION if fusion.shares == "points" else 0.0)
+        self._own_body = OwnBody(spec, duration=max(settings.report_lifetime, oldest), dt=dt)
         self._reports = ReportStore(
             self.name, settings, fusion=fusion, own_body=self._own_body, regions=self._regions, sharing=sharing
         )

@@ -45,6 +45,10 @@ MountSetting = Annotated[
 ]
 
 
+MIN_ROTATION = 0.1
+"""Minimum rate of revolutions of a lidar [Hz]."""
+
+
 class SensorSettings(Settings):
     """Settings of all sensors: a mount (None: default of the kind) and a rate (None: each tick)."""
 
@@ -197,7 +201,7 @@ class LidarSettings(SensorSettings):
     channels: Annotated[int, Field(ge=1, le=4096)] = 32
     range: Annotated[float, Field(gt=0.0, le=MAX_RANGE)] = 50.0
     points_per_second: Annotated[int, Field(ge=1, le=100_000_000)] = 100_000
-    rotation: Annotated[float, Field(ge=0.1, le=1000.0)] = 20.0
+    rotation: Annotated[float, Field(ge=MIN_ROTATION, le=1000.0)] = 20.0
     upper_fov: float = Field(default=10.0, ge=-90.0, le=90.0)
     lower_fov: float = Field(default=-30.0, ge=-90.0, le=90.0)
     field_of_view: float = Field(default=360.0, gt=0.0, le=360.0)

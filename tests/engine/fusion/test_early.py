@@ -179,10 +179,10 @@ def test_early_fusion_box_from_several_sides_is_more_accurate() -> None:
     assert both.boxes[0, 3] == pytest.approx(5.4, abs=0.1)
 
 
-@pytest.mark.parametrize("height", [0.0, 60.0, -20.0])
-def test_early_fusion_ignores_ego_body_in_received_points(height: float) -> None:
+@pytest.mark.parametrize(("height", "timeout"), [(0.0, None), (60.0, None), (-20.0, None), (0.0, 0.1)])
+def test_early_fusion_ignores_ego_body_in_received_points(height: float, timeout: float | None) -> None:
     """The ego drives at 15 m/s, and the point cloud is 0.3 s old; roads have any height."""
-    ego, rsu = agent(EGO), agent(RSU)
+    ego, rsu = agent(EGO, report_timeout=timeout), agent(RSU)
     here = [readings(0.05 * tick, (0.75 * tick, 0.0, 0.0), height=height) for tick in range(8)]
     body = car(EGO.offset[0], 0.0, "fblr")
     sent = rsu.act(readings(0.0, (40.0, 12.0, math.pi), body, height=height), (), 0.0, None).outbox[0]
@@ -235,6 +235,17 @@ def test_boxes_of_a_station_are_fused_while_its_points_are_too_old() -> None:
         readings(0.4, (0.0, 0.0, 0.0)), [ReceivedMessage(replace(sent, detections=box), 0.4)], 0.4, None
     )
     assert [round(x, -1) for x in late.fused.boxes[:, 0].tolist()] == [50.0]
+
+
+def test_boxes_of_a_station_are_fused_until_its_points_are_merged() -> None:
+    """The own lidar has no reading in the tick in which the points arrive; places as above."""
+    ego, rsu = agent(EGO), agent(RSU)
+    sent = rsu.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None).outbox[0]
+    box = replace(sent.detections, boxes=sent.detections.boxes + np.array([30.0, *[0.0] * 6]))
+    received = ReceivedMessage(replace(sent, detections=box), 0.05)
+    waiting = ego.act(replace(readings(0.05, (0.0, 0.0, 0.0)), lidars={}), [received], 0.05, None).fused
+    merged = ego.act(readings(0.1, (0.0, 0.0, 0.0)), (), 0.1, None).fused
+    assert [round(x, -1) for fused in (waiting, merged) for x in fused.boxes[:, 0].tolist()] == [50.0, 20.0]
 
 
 def test_boxes_of_a_station_beyond_the_grid_of_the_detector_are_fused() -> None:
