@@ -115,9 +115,22 @@ def view_sectors(
     sectors = []
     for settings in sensors:
         mount = mounting(settings, spec, "front" if isinstance(settings, CameraSettings) else "roof")
-        angle = math.radians(getattr(settings, "fov", getattr(settings, "field_of_view", 360.0)))
-        sectors.append(ViewSector(mount.x, mount.y, mount.z, mount.heading, angle / 2.0, range_of(settings)))
+        half = math.radians(getattr(settings, "fov", getattr(settings, "field_of_view", 360.0))) / 2.0
+        if isinstance(settings, CameraSettings) and any(settings.distortion):
+            half = _undistorted(half, settings.distortion)
+        sectors.append(ViewSector(mount.x, mount.y, mount.z, mount.heading, half, range_of(settings)))
     return tuple(sectors)
+
+
+def _undistorted(half: float, distortion: Sequence[float]) -> float:
+    """Return the angle [rad] of the nearer of the rays at the side edges of an image, which are at `half` without
+    distortion."""
+    import cv2
+
+    edges, same = np.array([[[-math.tan(half), 0.0]], [[math.tan(half), 0.0]]]), np.eye(3)
+    until = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-9)
+    rays = cv2.undistortPointsIter(edges, same, np.array(distortion), same, same, until)
+    return math.atan(float(np.abs(rays[:, 0, 0]).min()))
 
 
 Point = tuple[float, float, float]

@@ -126,7 +126,7 @@ def test_object_without_tracker_keeps_its_id_at_any_message_interval(interval: f
     spec = ActorSpec("RSU", "rsu", "misc", (0.3, 0.3, 5.0), (0.0, 0.0, 2.5))
     settings = AgentSettings.model_validate({"generation": "etsi", "message_phase": 0.0})
     message_generator = MessageGenerator(spec, settings, dt=0.1)
-    ids = []
+    ids: list[int] = []
     for tick in range(40):
         now, unknown = 0.1 * tick, np.full((1, 2), np.nan)
         boxes = np.array([[10.0 * now, 0.0, 0.75, 4.5, 1.8, 1.5, 0.0]])

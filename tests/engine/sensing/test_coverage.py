@@ -87,3 +87,12 @@ def test_range_of_a_detector_follows_from_the_resolution(
     detector: str, sensor: SensorSettings, expected: float
 ) -> None:
     assert build_detector(AgentSettings(detector=detector)).range_of(sensor) == pytest.approx(expected, abs=0.05)
+
+
+@pytest.mark.parametrize("distortion", [0.1, -0.1])
+def test_sector_of_a_distorted_camera_ends_at_the_edge_of_its_image(distortion: float) -> None:
+    """A ray at 45 degrees, x = 1, is at x (1 + k x²) in the image: at the edge for a fov of 2 atan(1 + k)."""
+    fov = 2.0 * math.degrees(math.atan(1.0 + distortion))
+    camera = CameraSettings(width=400, height=100, fov=fov, distortion=(distortion, 0.0, 0.0, 0.0, 0.0))
+    (sector,) = view_sectors([camera], CAR)
+    assert math.degrees(sector.half_angle) == pytest.approx(45.0)
