@@ -150,6 +150,8 @@ class Agent:
             self._reports.add(Report(self.name, own, now, own_state, pose_change=change))
             if self._regions is not None:
                 self._regions.add(self.name, own.time, self._own_body.at(own.time).reference, self._view)
+        elif own is not None and self.sharing is not None:
+            self._reports.keep_joint(own, now)
         obeys = self.planner is not None and self.settings.obey_signals
         return StationPerception(
             now,

@@ -228,6 +228,8 @@ class ReportStore:
         """Maximum age of a report that is used [s]."""
         self._next_deletion = math.inf
         """Time up to which no report exceeds its lifetime [s]."""
+        self._joint: list[Detections] = []
+        """Objects in merged sensor data that wait for the own message of their time."""
 
     @property
     def newest(self) -> Sequence[Report]:
@@ -274,7 +276,10 @@ class ReportStore:
             if message.detections.time + self._lifetime < now - TIME_TOLERANCE:
                 expired.append(row)
                 continue
-            detections = message.identified
+            detections, objects = message.identified, message.objects
+            joint = [held for held in self._joint if own and held.time <= message.detections.time + TIME_TOLERANCE]
+            if joint:
+                detections, objects, complete = joint[-1], None, True
             state: StationState | None = message.state
             pose_change: Array | None = None
             if not own:
@@ -286,10 +291,10 @@ class ReportStore:
                 state = replace(state, pose_covariance=None)
             station = sender if perceived else sender + SENDER_REPORT_SUFFIX
             completed: Detections | None = None
-            if message.objects is not None:  # the message lists a part of the objects of its sender
+            if objects is not None:  # the message lists a part of the objects of its sender
                 if sender not in self._partial:
                     self._partial[sender] = PartialReportAssembler(self._lifetime)
-                completed = self._partial[sender].update(message.objects, detections)
+                completed = self._partial[sender].update(objects, detections)
             report = Report(station, detections, received.arrived, state, complete, pose_change, not perceived)
             self.add(report, completed)
         if now > self._next_deletion:
@@ -299,6 +304,13 @@ class ReportStore:
                     del self._reports[station]
             self._next_deletion = min((ends[station] for station in self._reports), default=math.inf)
         return tuple(expired)
+
+    def keep_joint(self, detections: Detections, now: float) -> None:
+        """Store objects in merged sensor data. They are used when a message of the station to itself arrives, with
+        which they are delayed and lost; it contains the objects in the own data only.
+        """
+        self._joint = [held for held in self._joint if held.time + self._lifetime >= now - TIME_TOLERANCE]
+        self._joint.append(detections)
 
     def add(self, report: Report, completed: Detections | None = None) -> None:
         """Pass a report to the fusion method, and store it unless a newer one of its station is stored.

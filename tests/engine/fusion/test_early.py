@@ -248,6 +248,22 @@ def test_boxes_of_a_station_are_fused_until_its_points_are_merged() -> None:
     assert [round(x, -1) for fused in (waiting, merged) for x in fused.boxes[:, 0].tolist()] == [50.0, 20.0]
 
 
+def test_objects_in_merged_points_arrive_with_the_own_message() -> None:
+    """A channel with own perception delays what the station detects; the message has objects in its own points only."""
+    ego, rsu = agent(EGO), agent(RSU)
+    sent = rsu.act(readings(0.0, (40.0, 12.0, math.pi), car(*CAR, "fl")), (), 0.0, None).outbox[0]
+    inbox, fused = [ReceivedMessage(sent, 0.05)], []
+    for tick in range(1, 5):
+        now = 0.05 * tick
+        step = ego.act(readings(now, (0.0, 0.0, 0.0)), inbox, now, None, own_perception=True)
+        fused.append(step.fused.boxes[:, :2])
+        (own,) = step.outbox
+        assert len(own.detections) == 0
+        inbox = [ReceivedMessage(own, now + 0.05)] if tick < 3 else []
+    assert [len(boxes) for boxes in fused] == [0, 1, 1, 1]
+    assert math.dist(fused[1][0], CAR) < 0.5
+
+
 def test_boxes_of_a_station_beyond_the_grid_of_the_detector_are_fused() -> None:
     """The grid ends 51.2 m from the ego; points of the station are merged, and it reports cars 40 m and 60 m ahead."""
     fusion, detector = EarlyFusion(), CellDetector()
