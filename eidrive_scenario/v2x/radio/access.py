@@ -196,7 +196,9 @@ class MediumAccess(ABC):
         )
         for transmission in self.active:
             reorder_fields(transmission, rows, gain=0.0, busy=False)
-        self.gate = self.gate.reorder(rows)
+        fresh = vars(DccGate(self.gate.control, 1, self.gate.background))
+        states = ("share", "filtered", "before", "reactive")
+        reorder_fields(self.gate, rows, **{name: fresh[name].item() for name in states})
         self.names, self._rows = names, {name: row for row, name in enumerate(names)}
         self.reorder(rows)
         return lost
