@@ -172,6 +172,7 @@ def test_file_that_cannot_be_written_whole_keeps_its_former_content(
         capture_output=True,
         check=False,
         cwd=recorded,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},  # truncated bytecode would break later imports
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)),
     )
     error = done.stderr.decode()

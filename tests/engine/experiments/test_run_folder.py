@@ -254,6 +254,7 @@ def test_full_disk_aborts_run_with_partial_recording(tmp_path: Path) -> None:
     """A limit of the file size replaces the full disk."""
     code = (
         "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+        "sys.dont_write_bytecode = True;"  # truncated bytecode would break later imports
         "resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000));"
         "from eidrive_scenario.cli import main; main()"
     )
