@@ -84,6 +84,15 @@ class PlannedPath:
         """Return the index of the nearest segment among the next REACH segments from `start` on."""
         return start + nearest_segment(self._segments[start : start + REACH], x, y)[0]
 
+    def nearest(self, x: float, y: float, yaw: float) -> int:
+        """Return the index of the nearest segment of the whole path; segments along the heading [rad] have priority."""
+        step = np.diff(self.points, axis=0)
+        offset = (x, y) - self.points[:-1]
+        share = np.clip(np.einsum("mi,mi->m", offset, step) / np.einsum("mi,mi->m", step, step), 0.0, 1.0)
+        away = np.hypot(*(offset - share[:, None] * step).T)
+        along = step @ (math.cos(yaw), math.sin(yaw)) > 0.0
+        return int(np.argmin(np.where(along, away, np.inf) if along.any() else away))
+
     def distance(self, x: float, y: float, index: int) -> float:
         """Return the distance of a point from the segment at an index [m]."""
         x0, y0, dx, dy, _ = self._segments[index]

@@ -83,6 +83,9 @@ TURNS = 50.0
 """Maximum length of a road that may lead into itself within a stride [m]."""
 BEYOND = 100.0
 """Distance beyond the end of the road within which a vehicle still stops for it [m]; farther away it was teleported."""
+ASTRAY = 10.0
+"""Distance from a route above which the vehicle was teleported, or left the route by another action, and its place on
+the route is searched again [m]: more than maneuvers beside the route require, as overtaking in the next lanes."""
 BEHIND = 5
 """Number of points behind the vehicle that are kept when the path is extended."""
 
@@ -142,6 +145,9 @@ class RoutePlanner(Planner):
         x, y, _ = ego.position.tolist()
         path = self._current_path(ego, goal)
         self._progress = path.project(x, y, self._progress)
+        is_route = goal is not None and (goal.is_route or (goal.path is None and goal.waypoints is not None))
+        if is_route and path.distance(x, y, self._progress) > ASTRAY:
+            self._progress = path.nearest(x, y, ego.yaw)
         if (
             self._way[0] is None
             and self._way[1] is None

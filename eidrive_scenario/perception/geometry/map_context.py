@@ -103,7 +103,8 @@ class MapContext:
         return boxes[near & ~self.on_lane(boxes[:, :2])]
 
     def lane_heading(self, plan: Array, near: Array) -> Array:
-        """Return the driving direction (N,) at points (N, 2) [rad]; NaN off the roads and in junctions.
+        """Return the driving direction (N,) at points (N, 2) [rad]; NaN off the roads, in junctions, and on lanes for
+        both directions.
 
         near  heights (N,) next to which the roads are, if several are above each other [m]
         """
@@ -113,7 +114,9 @@ class MapContext:
         located = self._locate(self._roads, plan, near)
         for point in np.flatnonzero((located.road >= 0) & (located.outside <= 0.0) & (located.lane != 0)).tolist():
             road, lane = located.roads[int(located.road[point])], int(located.lane[point])
-            if self._roads.roads[road].junction_id is not None:
+            mapped = self._roads.roads[road].section_at(float(located.s[point])).lanes.get(lane)
+            has_both = mapped is not None and mapped.is_two_way
+            if has_both or self._roads.roads[road].junction_id is not None:
                 continue
             against = self._roads.driving_direction(road, lane) < 0
             headings[point] = float(located.heading[point]) + (np.pi if against else 0.0)

@@ -60,6 +60,8 @@ def parse_road_map(text: bytes, source: str) -> RoadMap:
     junctions = {}
     for element in root.iterfind("junction"):
         junction = _read_junction(element, roads, collector)
+        if junction.id in junctions:
+            collector.report_error(element, f"junction {junction.id!r} occurs twice", "give each junction a unique id")
         junctions[junction.id] = junction
     roads = {number: _with_valid_links(road, roads, junctions, collector) for number, road in roads.items()}
     signals = read_signals(elements, roads, collector)

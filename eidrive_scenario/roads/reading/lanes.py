@@ -190,7 +190,9 @@ def _lane(
         level=collector.flag(element, "level"),
         direction=element.get("direction", "standard"),
         road_marks=tuple(sorted(_read_marks(element, begin, collector), key=lambda mark: mark.s_offset)),
-        heights=tuple(_read_height(e, begin, collector) for e in element.iterfind("height")),
+        heights=tuple(
+            sorted((_read_height(e, begin, collector) for e in element.iterfind("height")), key=lambda h: h.s_offset)
+        ),
         speeds=tuple(sorted((s, limit) for s, limit in speeds if limit is not None)),
         width_from=width_from,
         line=line_of(element),

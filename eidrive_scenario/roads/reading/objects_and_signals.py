@@ -115,6 +115,8 @@ def read_controllers(
                 collector.report_error(control, message, "correct the id")
             members.append(number)
         number = collector.text(element, "id")
+        if number in controllers:
+            collector.report_error(element, f"controller {number!r} occurs twice", "give each controller a unique id")
         controllers[number] = SignalController(number, element.get("name", ""), tuple(members))
     return controllers
 

@@ -230,3 +230,35 @@ def test_way_of_thousands_of_kilometers_is_an_error(car: ActorSpec, axis: str) -
     far = np.array([[0.0, 0.0, 0.0], [1.38e8, 0.0, 0.0]])
     with pytest.raises(RouteError, match=r"the way to the destination .* has a length of 138,000 km"):
         planner(car, None).plan(ego(0.0, 0.0), NOTHING, Goal(path=far) if axis == "path" else Goal(waypoints=far), 0.0)
+
+
+U_TURN = np.array([[x, 0.0, 0.0] for x in range(0, 102, 2)] + [[x, 20.0, 0.0] for x in range(100, -2, -2)])
+"""Line of 100 m along x, and back 20 m beside it."""
+
+
+def test_vehicle_that_resumes_a_route_far_along_it_continues_there(car: ActorSpec) -> None:
+    """The vehicle is on the way back, nearer to its end than the planner searches from the start of the route."""
+    plan = planner(car, None).plan(ego(30.0, 20.0, math.pi, 10.0), Detections(0.0), Goal(path=U_TURN, is_route=True), 0)
+    assert math.dist(plan.points[0], (30.0, 20.0)) < 1.5
+    assert plan.points[-1] == pytest.approx([0.0, 20.0], abs=0.1)
+
+
+@pytest.mark.parametrize(("x", "y", "yaw"), [(10.0, 0.0, 0.0), (90.0, 20.0, math.pi), (20.0, 20.0, math.pi)])
+def test_vehicle_that_is_teleported_along_its_route_continues_there(
+    car: ActorSpec, x: float, y: float, yaw: float
+) -> None:
+    goal, on_route = Goal(path=U_TURN, is_route=True), planner(car, None)
+    for start in range(0, 80, 2):
+        on_route.plan(ego(float(start), 0.0, 0.0, 10.0), Detections(0.0), goal, 0.0)
+    plan = on_route.plan(ego(x, y, yaw, 10.0), Detections(0.0), goal, 0.0)
+    assert math.dist(plan.points[0], (x, y)) < 1.5
+    assert (plan.points[1] - plan.points[0]) @ (math.cos(yaw), math.sin(yaw)) > 0.9
+
+
+def test_vehicle_in_the_lane_of_the_way_back_keeps_its_progress(car: ActorSpec) -> None:
+    """A way back 4 m beside the route is nearer to a vehicle that overtakes there."""
+    goal, on_route = Goal(path=U_TURN * (1.0, 0.2, 1.0), is_route=True), planner(car, None)
+    for x in range(0, 60, 2):
+        on_route.plan(ego(float(x), 0.0, 0.0, 10.0), Detections(0.0), goal, 0.0)
+    plan = on_route.plan(ego(60.0, 4.0, 0.0, 10.0), Detections(0.0), goal, 0.0)
+    assert plan.points[0] == pytest.approx([60.0, 0.0], abs=1.5)

@@ -228,6 +228,18 @@ def test_detect_with_map_uses_roads_and_lane_directions(street: Any) -> None:
     assert len(everywhere.detect(readings)) == 3
 
 
+@pytest.mark.parametrize("attribute", ['type="bidirectional"', 'type="driving" direction="both"'])
+@pytest.mark.parametrize("yaw", [0.0, math.pi])
+def test_lane_for_both_directions_does_not_turn_cars(street: Any, attribute: str, yaw: float) -> None:
+    """Without a lane the front points away from the sensor, which is behind the car or ahead of it."""
+    ego, car = street.thing("Ego", -20 if yaw == 0.0 else 20, -1.75, yaw), street.thing("Car", 0, -1.75, yaw)
+    roads = RoadNetwork.parse(ROAD.replace('type="driving"', attribute))
+    detector = LidarDetector()
+    detector.setup(DetectorContext(street.spec(ego), {"roof": CLEAN}, roads))
+    detections = detector.detect(street.readings([ego, car], {"roof": CLEAN}))
+    assert math.cos(detections.boxes[nearest(detections, car.box), 6] - yaw) > 0.99
+
+
 @pytest.mark.parametrize("distance", [4.0, 6.0])
 @pytest.mark.parametrize("height", [1.16, 1.27, 1.49])
 def test_detect_children_as_pedestrians(street: Any, distance: float, height: float) -> None:

@@ -161,6 +161,17 @@ def test_lane_height_raises_sidewalk(inner: str, outer: str) -> None:
     assert network.lane_pose("1", -2, [10.0], [0.0]).z == pytest.approx(0.12)
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_heights_of_a_lane_apply_from_their_offsets_in_any_order(order: int) -> None:
+    heights = [f'<height sOffset="{s}" inner="{z}" outer="{z}"/>' for s, z in ((0, 0.1), (50, 0.3))]
+    lane = (
+        f'<lane id="-1" type="sidewalk"><width sOffset="0" a="2" b="0" c="0" d="0"/>{"".join(heights[::order])}</lane>'
+    )
+    lanes = f'<laneSection s="0"><center><lane id="0"/></center><right>{lane}</right></laneSection>'
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=lanes)))
+    assert [network.lane_pose_at("1", -1, s).z for s in (10.0, 60.0)] == pytest.approx([0.1, 0.3])
+
+
 def test_pose_at_unknown_road_lane_or_s_is_an_error() -> None:
     network = RoadNetwork.parse(map_xml(road_xml("10"), road_xml("11", y=30.0)))
     with pytest.raises(PositionError, match=r"road '12' does not exist; known: 10, 11"):

@@ -54,6 +54,12 @@ def test_all_errors_are_reported_with_line_and_hint() -> None:
     ]
 
 
+@pytest.mark.parametrize("kind", ["junction", "controller"])
+def test_junctions_and_controllers_with_one_id_are_errors(kind: str) -> None:
+    text = map_xml(road_xml(), *[f'\n<{kind} id="7" name="{name}"/>' for name in ("a", "b")])
+    assert f"town.xodr:3: {kind} '7' occurs twice; give each {kind} a unique id" in road_diagnostics(text)
+
+
 def sides(*parts: str) -> str:
     """Return a lane section with these sides."""
     return f'<laneSection s="0">{"".join(parts)}</laneSection>'
