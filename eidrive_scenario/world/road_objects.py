@@ -217,7 +217,7 @@ def object_bodies(roads: RoadNetwork, placed: PlacedObject) -> Iterator[RoadObje
             yield RoadObjectBody(name, "tree", pose, length, width, height, TRUNK * height)
         elif kind == "vegetation":
             yield RoadObjectBody(name, kind, pose, length, width, height, solid=False)
-        elif kind in ("pole", "lamp", "guide post") or road_object.radius:
+        elif placed.shift is not None and (kind in ("pole", "lamp", "guide post") or road_object.radius):
             yield RoadObjectBody(name, kind, pose, length, width, height, max(length, width) / 2)
         else:
             yield RoadObjectBody(name, kind, pose, length, width, height, solid=height >= STEP or pose.z > 0.0)

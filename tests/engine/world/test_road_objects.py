@@ -213,6 +213,15 @@ def test_long_barrier_stops_a_car() -> None:
     assert {contact.second for contact in contacts} == {"rail"}
 
 
+def test_round_object_that_repeats_without_gaps_is_as_wide_as_its_radius() -> None:
+    """A hand rail with a radius of 0.1 m, in parts of up to 5 m."""
+    repeat = '<repeat s="0" length="50" distance="0" tStart="-4" tEnd="-4" radiusStart="0.1" radiusEnd="0.1"'
+    rail = f'type="railing" name="rail" s="0" t="-4" zOffset="0" radius="0.1" height="1">{repeat} heightStart="1"'
+    bodies = list(road_object_bodies(network(f'{rail} heightEnd="1" zOffsetStart="0" zOffsetEnd="0"/>')))
+    assert sum(body.length for body in bodies) == pytest.approx(50.0)
+    assert {(round(body.width, 6), body.radius) for body in bodies} == {(0.2, 0.0)}
+
+
 @pytest.mark.parametrize(
     "attributes",
     [

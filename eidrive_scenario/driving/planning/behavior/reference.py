@@ -241,7 +241,11 @@ class ReferenceLine:
             lane = section.lanes[number]
             center = (lane_t(road, section, lane, location.s)[0] - location.t) * sense
             half = lane.width.value(location.s - section.s) / 2.0
-            lanes.append(_Lane(number, center, half, lane.drivable, roads.driving_direction(road.id, number) == sense))
+            # On a lane for both directions the vehicle meets traffic unless it is its own.
+            with_traffic = roads.driving_direction(road.id, number) == sense and (
+                not lane.is_two_way or number == location.lane
+            )
+            lanes.append(_Lane(number, center, half, lane.drivable, with_traffic))
         return _Section(location, section, lanes, order.index(location.lane), road.rule == "LHT")
 
     def _lanes_at(self, index: int) -> LanesBeside:

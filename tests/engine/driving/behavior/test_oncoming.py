@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from opendrive_xml import lane_xml, map_xml, road_xml, section_xml
 
 from eidrive_scenario.driving.planning.behavior.oncoming import (
     PAUSE,
@@ -20,6 +21,7 @@ from eidrive_scenario.driving.planning.behavior.reference import LanesBeside, Re
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 from eidrive_scenario.driving.planning.path import PlannedPath
+from eidrive_scenario.roads import RoadNetwork
 
 BESIDE = LanesBeside(oncoming=3.5, oncoming_limit=15.0)
 TIMES = np.arange(0.0, 12.01, 0.25)
@@ -241,3 +243,16 @@ def test_vehicle_without_any_view_begins_after_two_long_pauses(is_last_place: bo
     there = scene((6.3 + 2.5, 0.0, 0.0))
     for now, expected in ((13.0, False), (23.9, False), (24.0, is_last_place)):
         assert waiting.yields(Outlook(LINE, there, BESIDE, now), (1.4, 0.0), is_last_place=is_last_place) is expected
+
+
+@pytest.mark.parametrize("kind", ["bidirectional", "driving"])
+@pytest.mark.parametrize("reverse", [False, True])
+def test_lane_for_both_directions_has_oncoming_traffic(kind: str, reverse: bool) -> None:
+    """A turning lane between two lanes: from either side it is the lane in which traffic may come."""
+    middle = lane_xml(1, kind=kind).replace("<lane ", '<lane direction="both" ' if kind == "driving" else "<lane ", 1)
+    lanes = section_xml(left=lane_xml(2) + middle, right=lane_xml(-1))
+    roads = RoadNetwork.parse(map_xml(road_xml(length=600.0, lanes=lanes)))
+    line = [(600.0, 5.25), (0.0, 5.25)] if reverse else [(0.0, -1.75), (600.0, -1.75)]
+    beside = ReferenceLine(PlannedPath(np.array(line), ends=True), roads).lanes_beside(100.0)
+    assert math.isnan(beside.left)
+    assert beside.oncoming == pytest.approx(3.5)
