@@ -196,9 +196,7 @@ class MediumAccess(ABC):
         )
         for transmission in self.active:
             reorder_fields(transmission, rows, gain=0.0, busy=False)
-        fresh = vars(DccGate(self.gate.control, 1, self.gate.background))
-        states = ("share", "filtered", "before", "reactive")
-        reorder_fields(self.gate, rows, **{name: fresh[name].item() for name in states})
+        self.gate = self.gate.reorder(rows)
         self.names, self._rows = names, {name: row for row, name in enumerate(names)}
         self.reorder(rows)
         return lost

@@ -123,3 +123,12 @@ class DccGate:
             wanted = duration / float(self.share[station])
             return min(max(wanted, self.control.interval_min), self.control.interval_max)
         return float(self.reactive[station])
+
+    def reorder(self, rows: list[int | None]) -> DccGate:
+        """Return the gate for reordered stations, each with the state of its former row or a new state."""
+        gate = DccGate(self.control, len(rows), self.background)
+        kept = [new for new, old in enumerate(rows) if old is not None]
+        former = [old for old in rows if old is not None]
+        for field in ("share", "filtered", "before", "reactive"):
+            getattr(gate, field)[kept] = getattr(self, field)[former]
+        return gate
