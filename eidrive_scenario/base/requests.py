@@ -35,6 +35,11 @@ class Goal(msgspec.Struct, frozen=True):
     lap: Array | None = None
     is_route: bool = False
 
+    @property
+    def follows_route(self) -> bool:
+        """Whether the way is a route: that of the path, or the one that the agent plans."""
+        return self.is_route or (self.path is None and self.waypoints is not None)
+
 
 @dataclass(frozen=True)
 class Override:

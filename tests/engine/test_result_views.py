@@ -71,8 +71,8 @@ def test_to_dict_of_result_is_flat_and_scalar() -> None:
 
 
 def test_to_dict_keeps_columns_that_have_the_name_of_a_metric() -> None:
-    row = replace(RESULT, metrics={"channel": 0.5, "seed": 9.0, "reach.passed": 0.0, "own": 1.0}).to_dict()
-    assert (row["channel"], row["seed"], row["reach.passed"], row["own"]) == ("custom", 3, True, 1.0)
+    columns = replace(RESULT, metrics={"channel": 0.5, "seed": 9.0, "reach.passed": 0.0, "own": 1.0}).to_dict()
+    assert (columns["channel"], columns["seed"], columns["reach.passed"], columns["own"]) == ("custom", 3, True, 1.0)
 
 
 def test_to_dict_of_results_forms_a_data_frame() -> None:

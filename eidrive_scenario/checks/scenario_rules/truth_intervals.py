@@ -11,7 +11,7 @@ from eidrive_scenario.checks.scenario_rules.outline import Outline
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.conventions import is_criterion
 from eidrive_scenario.openscenario.model import Element, Rule
-from eidrive_scenario.openscenario.values.comparisons import satisfies_rule
+from eidrive_scenario.openscenario.values.parameters import satisfies_rule
 
 Intervals = tuple[tuple[float, float], ...]
 

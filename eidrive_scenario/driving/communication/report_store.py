@@ -72,10 +72,10 @@ class PartialReportAssembler:
             if time - known_object.time <= self._timeout
         }
         objects = [*self._objects.values()]
-        known = Detections.concatenate(time, objects)
+        predicted = Detections.concatenate(time, objects)
         age = time - np.array([known_object.time for known_object in objects])
-        known.boxes[:, :2] += np.nan_to_num(known.velocity) * age[:, None]
-        return known
+        predicted.boxes[:, :2] += np.nan_to_num(predicted.velocity) * age[:, None]
+        return predicted
 
 
 REGION_LIFETIME = 1.0

@@ -85,12 +85,9 @@ class PlannedPath:
         return start + nearest_segment(self._segments[start : start + REACH], x, y)[0]
 
     def nearest(self, x: float, y: float, yaw: float) -> int:
-        """Return the index of the nearest segment of the whole path; segments along the heading [rad] have priority."""
-        step = np.diff(self.points, axis=0)
-        offset = (x, y) - self.points[:-1]
-        share = np.clip(np.einsum("mi,mi->m", offset, step) / np.einsum("mi,mi->m", step, step), 0.0, 1.0)
-        away = np.hypot(*(offset - share[:, None] * step).T)
-        along = step @ (math.cos(yaw), math.sin(yaw)) > 0.0
+        """Return the index of the nearest point of the whole path; points where it leads along `yaw` have priority."""
+        away = np.hypot(*(self.points[:-1] - (x, y)).T)
+        along = np.diff(self.points, axis=0) @ (math.cos(yaw), math.sin(yaw)) > 0.0
         return int(np.argmin(np.where(along, away, np.inf) if along.any() else away))
 
     def distance(self, x: float, y: float, index: int) -> float:

@@ -145,9 +145,8 @@ class RoutePlanner(Planner):
         x, y, _ = ego.position.tolist()
         path = self._current_path(ego, goal)
         self._progress = path.project(x, y, self._progress)
-        is_route = goal is not None and (goal.is_route or (goal.path is None and goal.waypoints is not None))
-        if is_route and path.distance(x, y, self._progress) > ASTRAY:
-            self._progress = path.nearest(x, y, ego.yaw)
+        if goal is not None and goal.follows_route and path.distance(x, y, self._progress) > ASTRAY:
+            self._progress = path.project(x, y, max(path.nearest(x, y, ego.yaw) - 1, 0))
         if (
             self._way[0] is None
             and self._way[1] is None

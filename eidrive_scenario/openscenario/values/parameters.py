@@ -12,12 +12,12 @@ from typing import Any
 
 import msgspec
 
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.errors import Diagnostic, SettingError, quoted, shortened, suggestion
 from eidrive_scenario.openscenario.diagnostics import MAX_TEXT, Budget, BudgetError, DiagnosticCollector, Location
 from eidrive_scenario.openscenario.model import ParameterDeclaration, ParameterType, Rule, ValueConstraintGroup
 from eidrive_scenario.openscenario.model.declarations import Limits
 from eidrive_scenario.openscenario.values import expressions
-from eidrive_scenario.openscenario.values.comparisons import satisfies_rule
 from eidrive_scenario.openscenario.values.expressions import REFERENCE, ExpressionError, Value
 from eidrive_scenario.openscenario.values.scalars import (
     BOOLEAN,
@@ -254,6 +254,26 @@ def fits_type(text: str, scalar: Scalar) -> bool:
     except ValueError:
         return False
     return True
+
+
+def satisfies_rule(value: float, rule: Rule, limit: float) -> bool:
+    """Compare `value` with `limit` by a Rule of the standard; NaN fulfills no rule."""
+    if value != value:
+        return False
+    match rule._value_:
+        case "greaterThan":
+            return value > limit + EPSILON
+        case "greaterOrEqual":
+            return value >= limit - EPSILON
+        case "lessThan":
+            return value < limit - EPSILON
+        case "lessOrEqual":
+            return value <= limit + EPSILON
+        case "equalTo":
+            return value == limit or abs(value - limit) <= EPSILON
+        case "notEqualTo":
+            return not (value == limit or abs(value - limit) <= EPSILON)
+    raise ValueError(f"unknown rule {rule!r}")
 
 
 def _holds(group: ValueConstraintGroup, value: Any, scalar: Scalar) -> bool:

@@ -13,7 +13,7 @@ from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.extensions.registry import is_built_in
 from eidrive_scenario.openscenario import model
-from eidrive_scenario.openscenario.values.comparisons import satisfies_rule
+from eidrive_scenario.openscenario.values.parameters import satisfies_rule
 from eidrive_scenario.storyboard.context.contexts import ConditionContext, MotionChange
 
 SYMBOLS = {

@@ -90,8 +90,8 @@ def test_rising_rate_and_other_range_are_found() -> None:
 @pytest.mark.statistical
 def test_bound_selects_other_place_of_curve() -> None:
     """The rate of 0.9 is at 0.37 - 0.05 ln 9 = 0.260."""
-    found = [searched(seed, 160, falling, bound=0.9) for seed in range(10)]
-    assert np.median([one.value for one in found]) == pytest.approx(0.26, abs=0.02)
+    boundaries = [searched(seed, 160, falling, bound=0.9).value for seed in range(10)]
+    assert np.median(boundaries) == pytest.approx(0.26, abs=0.02)
 
 
 @pytest.mark.parametrize("always", [True, False])
@@ -104,8 +104,8 @@ def test_constant_outcome_has_no_boundary_in_range(always: bool) -> None:
 @pytest.mark.statistical
 def test_lapses_do_not_move_boundary() -> None:
     """One outcome in twenty is random; the median of ten searches is at the boundary."""
-    found = [searched(seed, 120, lambda x: 0.025 + 0.95 * float(x < 0.6)).value for seed in range(10)]
-    assert np.median(found) == pytest.approx(0.6, abs=0.02)
+    boundaries = [searched(seed, 120, lambda x: 0.025 + 0.95 * float(x < 0.6)).value for seed in range(10)]
+    assert np.median(boundaries) == pytest.approx(0.6, abs=0.02)
 
 
 @pytest.mark.parametrize(

@@ -149,8 +149,7 @@ class BehaviorPlanner(RoutePlanner):
             line, self._route_lanes = before, self._route_lanes[1:]
         else:
             line, goal = ReferenceLine(path, self.roads, z), self._goal
-            is_route = goal is not None and (goal.is_route or (goal.path is None and goal.waypoints is not None))
-            self._route_lanes = route_lanes(line) if is_route else []
+            self._route_lanes = route_lanes(line) if goal is not None and goal.follows_route else []
         if self._route_lanes:
             line = ReferenceLine(path, self.roads, z, self._route_lanes[0].offsets)
         self._line = line
