@@ -9,23 +9,12 @@ are those of its equations.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.v2x.analytic.table import (
-    RATIOS,
-    REACH,
-    STEP,
-    ErrorTable,
-    autocorrelation,
-    errors_over,
-    interference,
-    interferer_positions,
-    loss_by_interferer,
-    sensed_share,
-    signal,
-)
-from eidrive_scenario.v2x.propagation import winner_b1
+from eidrive_scenario.v2x.analytic.table import RATIOS, STEP, ErrorTable, Road, autocorrelation, interference
 from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT, CANDIDATE_SHARE, NOISE_DBM, RESOURCE_BLOCKS, SENSING_DBM
 
 FREQUENCY = 5.91
@@ -68,30 +57,20 @@ def cv2x_mode4_errors(
 
     density  vehicles per meter;  rate  packets per second and vehicle;  power  [dBm];  subchannels  4 or 2
     """
-    height = ANTENNA_HEIGHT - environment_height
-
-    def received_power(meters: Array) -> Array:
-        return power - winner_b1(meters, FREQUENCY, height, height)
-
+    road = Road(density, power, SENSING, FREQUENCY, ANTENNA_HEIGHT - environment_height)
     blocks, ratios, block_errors = CODINGS[subchannels]
     noise = NOISE_DBM - 10.0 * np.log10(RESOURCE_BLOCKS / blocks)
     curve = np.interp(RATIOS, ratios, block_errors)
-    errors = errors_over(signal(received_power(distance), SENSING), curve)
+    errors = road.errors(distance, curve)
     propagation = errors @ interference(np.array([NO_INTERFERENCE]), noise)[0]  # (13)
-    not_sensed = 1.0 - sensed_share(received_power(distance), SENSING)  # (10)
-
-    to_receiver = interferer_positions(density)
-    to_sender = np.abs(to_receiver + distance[:, None])
-    with_interferer = errors @ interference(received_power(to_receiver), noise).T  # (17)
-    destroys = loss_by_interferer(with_interferer, propagation)  # (18)
+    not_sensed = 1.0 - road.sensed(distance)  # (10)
+    _, to_sender, destroys = road.interferers(distance, errors, noise, propagation)  # (17), (18)
 
     resources = subchannels * 1000.0 / rate  # (28)
-    power_by_distance = received_power(np.arange(-REACH, REACH + 1.0))
-    sensed = sensed_share(power_by_distance, SENSING)  # (11)
-    in_reach = density * float(sensed.sum())  # (29.1)
-    overlap = autocorrelation(sensed)  # (30.2)
+    in_reach = density * float(road.sensed_around.sum())  # (11), (29.1)
+    overlap = autocorrelation(road.sensed_around)  # (30.2)
 
-    def collides(excluded: float, threshold: float) -> Array:
+    def collides(excluded: float, sensing: Road) -> Array:
         """Return the probability of a collision: an interferer on the same resource destroys the packet.
 
         Equations (14), (15), (23) to (27), (30).
@@ -100,7 +79,7 @@ def cv2x_mode4_errors(
         common = overlap / overlap[0] * (density * excluded * overlap[0] / in_reach - apart) + apart
         candidates = CANDIDATE_SHARE * resources
         both = (resources - 2.0 * excluded + common) * (candidates / (resources - excluded)) ** 2
-        unaware = 1.0 - (1.0 - 1.0 / rate) * sensed_share(received_power(to_sender), threshold)
+        unaware = 1.0 - (1.0 - 1.0 / rate) * sensing.sensed(to_sender)
         chosen = unaware * both[np.floor(to_sender + 0.5).astype(np.int64)] / candidates**2
         lost: Array = 1.0 - np.prod(1.0 - chosen * destroys, axis=1)
         return lost
@@ -108,9 +87,9 @@ def cv2x_mode4_errors(
     excluded = _count_excluded(in_reach, resources)
     channel_busy_ratio = excluded / resources  # (34)
     weight = float(np.clip(2.0 * channel_busy_ratio - 0.4, 0.0, 1.0))  # (22)
-    collision = weight * collides(excluded, SENSING)
+    collision = weight * collides(excluded, road)
     if weight < 1.0:
-        raised, excluded = _raise_threshold(power_by_distance, density, resources)
+        raised, excluded = _raise_threshold(road, resources)
         collision = collision + (1.0 - weight) * collides(excluded, raised)  # (21)
     given = {
         "half_duplex": np.full_like(distance, rate / 1000.0),  # (7)
@@ -128,12 +107,11 @@ def _count_excluded(in_reach: float, resources: float) -> float:
     return half + float(shared.sum())
 
 
-def _raise_threshold(power: Array, density: float, resources: float) -> tuple[float, float]:
-    """Raise the threshold [dBm] until enough candidates remain (step 3); return it and the excluded resources (32)."""
-    threshold = SENSING
+def _raise_threshold(road: Road, resources: float) -> tuple[Road, float]:
+    """Raise the threshold until enough candidates remain (step 3); return it and the excluded resources (32)."""
     while True:
-        in_reach = 2.0 * density * float(sensed_share(power, threshold).sum())
+        in_reach = 2.0 * road.density * float(road.sensed_around.sum())
         excluded = _count_excluded(in_reach, resources)
         if resources - excluded >= CANDIDATE_SHARE * resources:
-            return threshold, excluded
-        threshold += STEP
+            return road, excluded
+        road = replace(road, sensing=road.sensing + STEP)

@@ -10,21 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.v2x.analytic.table import (
-    LEVELS,
-    RATIOS,
-    REACH,
-    STEP,
-    ErrorTable,
-    autocorrelation,
-    errors_over,
-    interference,
-    interferer_positions,
-    loss_by_interferer,
-    sensed_share,
-    signal,
-)
-from eidrive_scenario.v2x.propagation import winner_b1
+from eidrive_scenario.v2x.analytic.table import LEVELS, RATIOS, STEP, ErrorTable, Road, autocorrelation
 from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT, NOISE_DBM, PREAMBLE, SENSING_DBM, SLOT
 
 FREQUENCY = 5.89
@@ -66,30 +52,22 @@ def ieee80211p_errors(
     density  vehicles per meter;  rate  packets per second and vehicle;  size  [bytes];  power  [dBm]
     """
     height = ANTENNA_HEIGHT - environment_height
-
-    def received_power(meters: Array) -> Array:
-        return power - winner_b1(meters, FREQUENCY, height, height)
-
+    road = Road(density, power, SENSING, FREQUENCY, height)
     duration = airtime(size, bit_rate)
-    sensed = sensed_share(received_power(np.arange(-REACH, REACH + 1.0)), SENSING)  # (13)
     unsaturated = offered_load(density, rate, size, power, bit_rate, height)
     square, linear, constant = FIT
     channel_busy_ratio = square * unsaturated**2 + linear * unsaturated + constant  # (35)
-    overlap = autocorrelation(sensed)
+    overlap = autocorrelation(road.sensed_around)  # (13)
     overlap /= overlap.max()  # (20)
 
     curve = np.interp(RATIOS + 10.0 * np.log10(BANDWIDTH / bit_rate), *FRAME_ERRORS)
-    not_sensed = 1.0 - sensed_share(received_power(distance), SENSING)  # (12)
-    errors = errors_over(signal(received_power(distance), SENSING), curve)
+    not_sensed = 1.0 - road.sensed(distance)  # (12)
+    errors = road.errors(distance, curve)
     propagation = errors[:, round((NOISE_DBM - LEVELS[0]) / STEP)]  # (24)
 
-    to_receiver = interferer_positions(density)
-    to_sender = np.abs(to_receiver + distance[:, None])
+    to_receiver, to_sender, destroys = road.interferers(distance, errors, NOISE_DBM, propagation)  # (30), (31)
     closer = np.abs(to_receiver) < np.abs(distance)[:, None]
-    with_interferer = errors @ interference(received_power(to_receiver), NOISE_DBM).T  # (30)
-    destroys = loss_by_interferer(with_interferer, propagation)  # (31)
-    at_receiver = sensed_share(received_power(to_receiver), SENSING)
-    senses = sensed_share(received_power(to_sender), SENSING)
+    at_receiver, senses = road.sensed(to_receiver), road.sensed(to_sender)
     share = rate / (1.0 - channel_busy_ratio * overlap[np.floor(to_sender + 0.5).astype(np.int64)])
     same_slot = SLOT * share * senses  # (22)
     hidden = duration * share * (1.0 - senses)  # (18)
@@ -103,8 +81,8 @@ def ieee80211p_errors(
 
 def offered_load(density: float, rate: float, size: int, power: float, bit_rate: float, height: float) -> float:
     """Return the channel busy ratio without overlap of transmissions (34); `height` is the antenna height [m]."""
-    received = power - winner_b1(np.arange(-REACH, REACH + 1.0), FREQUENCY, height, height)
-    return density * rate * airtime(size, bit_rate) * float(sensed_share(received, SENSING).sum())
+    road = Road(density, power, SENSING, FREQUENCY, height)
+    return density * rate * airtime(size, bit_rate) * float(road.sensed_around.sum())
 
 
 def _any(probability: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Tables of packet errors over distance, and the received levels that analytic models compute them from.
+"""Tables of packet errors over distance, and the received levels on a road that analytic models compute them from.
 
 Both analytic models average a packet error curve over shadowed signal and shadowed interference. Each average is one
 correlation and one matrix product.
@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.v2x.propagation import winner_b1
 
 
 @dataclass(frozen=True)
@@ -70,21 +71,6 @@ REACH, FARTHEST_INTERFERER = 1500, 1000
 """Maximum distances at which vehicles contribute to the load and interfere [m]."""
 
 
-def sensed_share(power: Array, threshold: float) -> Array:
-    """Return the share of packets above the threshold, by mean power [dBm]."""
-    from scipy.special import erf
-
-    share: Array = 0.5 * (1.0 + erf((power - threshold) / (SHADOWING * math.sqrt(2.0))))
-    return share
-
-
-def signal(power: Array, threshold: float) -> Array:
-    """Return the power distribution (D, L) of the sensed packets, for mean powers (D,) [dBm]."""
-    density = np.exp(-0.5 * ((LEVELS - power[:, None]) / SHADOWING) ** 2)
-    density[:, threshold > LEVELS] = 0.0
-    return _normalize(density)
-
-
 def interference(power: Array, noise: float) -> Array:
     """Return the distribution (I, L) of noise plus one shadowed interferer, for mean powers (I,) [dBm]."""
     total = 10.0 ** (LEVELS[noise < LEVELS] / 10.0)
@@ -95,33 +81,63 @@ def interference(power: Array, noise: float) -> Array:
     return _normalize(density)
 
 
-def errors_over(packets: Array, curve: Array) -> Array:
-    """Return the packet error rate (D, L) at each level of noise and interference.
+@dataclass(frozen=True)
+class Road:
+    """Straight road with equal vehicles.
 
-    packets  (D, L) distributions of the signal power;  curve  (2 L - 1,) packet error rate by RATIOS
+    density         vehicles per meter
+    power, sensing  transmission power and sensing threshold [dBm]
+    frequency       carrier frequency [GHz]
+    height          height of the antennas above the environment [m]
     """
-    middle = len(LEVELS) - 1
-    full = _convolve(packets, curve[None, ::-1], axes=1)
-    errors: Array = np.clip(full[:, middle : middle + len(LEVELS)], 0.0, 1.0)
-    return errors
 
+    density: float
+    power: float
+    sensing: float
+    frequency: float
+    height: float
 
-def interferer_positions(density: float) -> Array:
-    """Return the positions of interferers relative to the receiver [m], spaced by 1/density on both sides."""
-    count = round(FARTHEST_INTERFERER * density)
-    positions = np.arange(-count, count + 1) / density
-    others: Array = positions[positions != 0.0]
-    return others
+    def received(self, distance: Array) -> Array:
+        """Return the mean received power over distances [dBm]."""
+        return self.power - winner_b1(distance, self.frequency, self.height, self.height)
 
+    def sensed(self, distance: Array) -> Array:
+        """Return the share of packets that vehicles sense over distances."""
+        from scipy.special import erf
 
-def loss_by_interferer(with_interferer: Array, alone: Array) -> Array:
-    """Return the probability (D, I) that an interferer destroys a packet that is received without it.
+        share: Array = 0.5 * (1.0 + erf((self.received(distance) - self.sensing) / (SHADOWING * math.sqrt(2.0))))
+        return share
 
-    with_interferer  (D, I) packet error rates with each interferer;  alone  (D,) without one
-    """
-    certain = alone[:, None] >= 1.0
-    added = (with_interferer - alone[:, None]) / np.where(certain, 1.0, 1.0 - alone[:, None])
-    return np.where(certain, 0.0, added)
+    @cached_property
+    def sensed_around(self) -> Array:
+        """Share of packets that vehicles sense at each meter up to REACH before and behind the sender."""
+        return self.sensed(np.arange(-REACH, REACH + 1.0))
+
+    def errors(self, distance: Array, curve: Array) -> Array:
+        """Return the error rate (D, L) of sensed packets over distances (D,) at each level of noise and interference.
+
+        curve  (2 L - 1,) packet error rate by RATIOS
+        """
+        density = np.exp(-0.5 * ((LEVELS - self.received(distance)[:, None]) / SHADOWING) ** 2)
+        density[:, self.sensing > LEVELS] = 0.0
+        middle = len(LEVELS) - 1
+        full = _convolve(_normalize(density), curve[None, ::-1], axes=1)
+        errors: Array = np.clip(full[:, middle : middle + len(LEVELS)], 0.0, 1.0)
+        return errors
+
+    def interferers(self, distance: Array, errors: Array, noise: float, alone: Array) -> tuple[Array, Array, Array]:
+        """Return the positions of interferers relative to the receiver (I,), their distances from the sender (D, I)
+        [m], and the probability (D, I) that each destroys a packet that is received without it.
+
+        errors  as by `errors`;  noise  [dBm];  alone  (D,) packet error rate without an interferer
+        """
+        count = round(FARTHEST_INTERFERER * self.density)
+        positions = np.arange(-count, count + 1) / self.density
+        positions = positions[positions != 0.0]
+        with_interferer = errors @ interference(self.received(positions), noise).T
+        certain = alone[:, None] >= 1.0
+        added = (with_interferer - alone[:, None]) / np.where(certain, 1.0, 1.0 - alone[:, None])
+        return positions, np.abs(positions + distance[:, None]), np.where(certain, 0.0, added)
 
 
 def autocorrelation(values: Array) -> Array:
