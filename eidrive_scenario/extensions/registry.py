@@ -52,12 +52,7 @@ class Registry:
         self.kind = kind
         self._points: dict[str, EntryPoint] = {}
         for point in _declared(kind) if points is None else points:
-            other = self._points.get(point.name)
-            if other is not None and other.value != point.value:
-                raise RegistryError(
-                    f"{singular(kind)} {point.name!r} is registered twice: {other.value} and {point.value}; "
-                    "rename or uninstall one"
-                )
+            self._check_name(point, "rename or uninstall one")
             self._points[point.name] = point
 
     def __contains__(self, name: str) -> bool:
@@ -68,12 +63,15 @@ class Registry:
 
     def add(self, name: str, value: str) -> None:
         """Add an extension `package.module:Object` that is not installed. Raise RegistryError for another one."""
-        other = self._points.get(name)
-        if other is not None and other.value != value:
-            raise RegistryError(
-                f"{singular(self.kind)} {name!r} is registered twice: {other.value} and {value}; rename one"
-            )
-        self._points.setdefault(name, EntryPoint(name, value, f"eidrive_scenario.{self.kind}"))
+        point = EntryPoint(name, value, f"eidrive_scenario.{self.kind}")
+        self._check_name(point, "rename one")
+        self._points.setdefault(name, point)
+
+    def _check_name(self, point: EntryPoint, hint: str) -> None:
+        other = self._points.get(point.name, point).value
+        if other != point.value:
+            described = f"{singular(self.kind)} {point.name!r} is registered twice: {other} and {point.value}"
+            raise RegistryError(f"{described}; {hint}")
 
     def value(self, name: str) -> str:
         """Return module and object of an extension as `package.module:Object`."""

@@ -94,16 +94,8 @@ def split_channels(text: str) -> list[str]:
 
 def path_beside(source: Any, folder: Path) -> Any:
     """Return the path of a file relative to a folder, or any other value unchanged."""
-    if isinstance(source, str | Path) and _is_file(folder / source):
-        return folder / source
-    return source
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return os.path.isfile(path)
-    except (OSError, ValueError):  # a YAML text that no file name can be
-        return False
+    # Unlike `Path.is_file`, the function returns False for a YAML text that no file name can be
+    return folder / source if isinstance(source, str | Path) and os.path.isfile(folder / source) else source
 
 
 def check_values(name: str, option: str, value: Any, folder: Path) -> None:
