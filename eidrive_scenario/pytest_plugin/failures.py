@@ -63,9 +63,7 @@ class RunRecord:
 
 def record_of(item: pytest.Item) -> RunRecord:
     """Return the record of a test, which is empty before its first run."""
-    if _records not in item.stash:
-        item.stash[_records] = RunRecord()
-    return item.stash[_records]
+    return item.stash.setdefault(_records, RunRecord())
 
 
 def add_properties(item: pytest.Item, entries: Iterable[tuple[str, object]]) -> None:

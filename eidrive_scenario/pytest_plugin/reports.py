@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-from collections import Counter
 from collections.abc import Generator, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -165,9 +164,10 @@ def show_annotations(terminalreporter: Any, config: pytest.Config) -> None:
             terminalreporter.line(printable(annotation(report, config.rootpath)))
     path = os.environ.get("GITHUB_STEP_SUMMARY")
     if path:
-        counts = Counter({outcome: _count(terminalreporter.stats.get(outcome, ())) for outcome in _OUTCOMES})
+        counts = {outcome: _count(terminalreporter.stats.get(outcome, ())) for outcome in _OUTCOMES}
         try:
-            _append(Path(path), summary(counts, reports))
+            with open(path, "a", encoding="utf-8") as file:
+                file.write(summary(counts, reports))
         except OSError as error:
             terminalreporter.line(f"GITHUB_STEP_SUMMARY: the summary is not written ({error})", yellow=True)
 
@@ -249,8 +249,3 @@ def _code(command: str) -> str:
     """Return a command as code in a cell: HTML, as a vertical bar ends a cell even in backquotes."""
     command = re.sub(r"[&<>|`*_\[\]\\$~]", lambda match: f"&#{ord(match[0])};", command)
     return f"<code>{' '.join(command.splitlines())}</code>"
-
-
-def _append(path: Path, text: str) -> None:
-    with path.open("a", encoding="utf-8") as file:
-        file.write(text)

@@ -212,12 +212,6 @@ class Stacks(_Repeated):
             stacks[entity] = stack if equals else None
         return stacks
 
-    def parse_text(self, text: str) -> str:
-        entity, equals, stack = text.partition("=")
-        if not entity.strip() or (equals and not stack.strip()):
-            raise ArgumentTypeError(f"no entity or stack is given (got {text!r})")
-        return text
-
     def texts(self, value: Mapping[str, YamlSource | None]) -> list[str]:
         return [name if stack is None else f"{name}={_file_or_text(stack)}" for name, stack in value.items()]
 
