@@ -24,12 +24,13 @@ from matplotlib.ticker import FixedFormatter, FixedLocator, MaxNLocator, Percent
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.experiments.statistics.intervals import Proportion
-from eidrive_scenario.reporting.drawing.vector_canvas import LABEL, NO_METADATA, Size, paper_style
+from eidrive_scenario.reporting.drawing.vector_canvas import LABEL, NO_METADATA, PAPER_STYLE, Size, paper_style
 
 PAGE_COLORS = {"#475569": "--axis", "#e5e7eb": "--line", "#334155": "--text", "#ffffff": "--paper"}
 """CSS variables of the page, whose values depend on its light or dark scheme, by the color that matplotlib draws."""
 AXIS, GRID, TEXT, PAPER = PAGE_COLORS
 PAGE_STYLE: dict[Any, Any] = {
+    **PAPER_STYLE,
     "axes.edgecolor": AXIS,
     "axes.labelcolor": TEXT,
     "axes.spines.left": False,
@@ -37,9 +38,6 @@ PAGE_STYLE: dict[Any, Any] = {
     "axes.spines.top": False,
     "font.size": 9.0,
     "grid.color": GRID,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "eidrive",
-    "text.parse_math": False,
     "xtick.color": AXIS,
     "xtick.labelcolor": TEXT,
     "ytick.labelcolor": TEXT,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property
 from typing import NamedTuple, overload
 
 from eidrive_scenario.base.arrays import Array, Integers
@@ -53,33 +54,31 @@ class LinkEvents(Sequence[LinkEvent]):
     def __init__(self, parts: Iterable[Sequence[LinkEvent] | OutcomeBlock]) -> None:
         self.parts: tuple[Sequence[LinkEvent] | OutcomeBlock, ...] = tuple(part for part in parts if len(part))
         self._number = sum(map(len, self.parts))
-        self._created: tuple[LinkEvent, ...] | None = None
 
     def __len__(self) -> int:
         return self._number
 
     def __iter__(self) -> Iterator[LinkEvent]:
-        return iter(self._events())
+        return iter(self._events)
 
     @overload
     def __getitem__(self, index: int) -> LinkEvent: ...
     @overload
     def __getitem__(self, index: slice) -> Sequence[LinkEvent]: ...
     def __getitem__(self, index: int | slice) -> LinkEvent | Sequence[LinkEvent]:
-        return self._events()[index]
+        return self._events[index]
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, tuple | list | LinkEvents):
             return NotImplemented
-        return len(self) == len(other) and self._events() == tuple(other)
+        return len(self) == len(other) and self._events == tuple(other)
 
     def __hash__(self) -> int:
-        return hash(self._events())
+        return hash(self._events)
 
     def __repr__(self) -> str:
-        return f"LinkEvents({list(self._events())!r})"
+        return f"LinkEvents({list(self._events)!r})"
 
+    @cached_property
     def _events(self) -> tuple[LinkEvent, ...]:
-        if self._created is None:
-            self._created = tuple(event for part in self.parts for event in part)
-        return self._created
+        return tuple(event for part in self.parts for event in part)
