@@ -37,6 +37,12 @@ def wrap_angle(angle: Any) -> Any:
     return math.pi - (math.pi - angle) % TURN
 
 
+def components(x: float, y: float, heading: float) -> tuple[float, float]:
+    """Return the components of a vector along a heading [rad] and to the left of it."""
+    cos, sin = math.cos(heading), math.sin(heading)
+    return cos * x + sin * y, cos * y - sin * x
+
+
 def rotation_matrix(yaw: Any, pitch: Any = 0.0, roll: Any = 0.0) -> Array:
     """Return rotations (..., 3, 3) from the body frame to the world frame: yaw, then pitch, then roll (z-y'-x'')."""
     yaw, pitch, roll = np.broadcast_arrays(yaw, pitch, roll)

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from eidrive_scenario.base.geometry import points_in_polygon, points_of_boxes
+from eidrive_scenario.base.geometry import components, points_in_polygon, points_of_boxes
 from eidrive_scenario.evaluation.actor_tracking import LaneTracker, corners
 from eidrive_scenario.roads.objects import crosswalks
 from eidrive_scenario.world.view import WorldView
@@ -40,9 +40,7 @@ def side_of(body: Sequence[float], x: float, y: float, other: Sequence[float] | 
 
     At a corner the axis along which the body overlaps the `other` body (7,) less decides, as two faces are near there.
     """
-    dx, dy = x - body[0], y - body[1]
-    cos, sin = math.cos(body[6]), math.sin(body[6])
-    ahead, left = cos * dx + sin * dy, cos * dy - sin * dx
+    ahead, left = components(x - body[0], y - body[1], body[6])
     distances: dict[Side, float] = {
         "front": abs(body[3] / 2.0 - ahead),
         "rear": abs(body[3] / 2.0 + ahead),
@@ -61,11 +59,10 @@ def side_of(body: Sequence[float], x: float, y: float, other: Sequence[float] | 
 def _relative(body: Sequence[float], other: Sequence[float]) -> tuple[float, float, float, float]:
     """Return the center of another body (7,) ahead and left of this one, and its distances along both axes at which
     the projections of the bodies touch [m]."""
-    dx, dy = other[0] - body[0], other[1] - body[1]
-    cos, sin = math.cos(body[6]), math.sin(body[6])
+    ahead, left = components(other[0] - body[0], other[1] - body[1], body[6])
     c, s = abs(math.cos(other[6] - body[6])), abs(math.sin(other[6] - body[6]))
     reach_ahead, reach_left = body[3] + c * other[3] + s * other[4], body[4] + s * other[3] + c * other[4]
-    return cos * dx + sin * dy, cos * dy - sin * dx, reach_ahead / 2.0, reach_left / 2.0
+    return ahead, left, reach_ahead / 2.0, reach_left / 2.0
 
 
 def approached_side(before: WorldView, of: str, other: str) -> Side | None:
@@ -78,12 +75,11 @@ def approached_side(before: WorldView, of: str, other: str) -> Side | None:
     """
     body = before.plain_boxes[before.rows[of]]
     own, their = before.states[before.rows[of]], before.states[before.rows[other]]
-    cos, sin = math.cos(body[6]), math.sin(body[6])
-    vx, vy = their.velocity_x - own.velocity_x, their.velocity_y - own.velocity_y
+    vx, vy = components(their.velocity_x - own.velocity_x, their.velocity_y - own.velocity_y, body[6])
     ahead, left, reach_ahead, reach_left = _relative(body, before.plain_boxes[before.rows[other]])
     ways: tuple[tuple[float, float, float, tuple[Side, Side]], ...] = (
-        (ahead, cos * vx + sin * vy, reach_ahead, ("front", "rear")),
-        (left, cos * vy - sin * vx, reach_left, ("left", "right")),
+        (ahead, vx, reach_ahead, ("front", "rear")),
+        (left, vy, reach_left, ("left", "right")),
     )
     longest, side = 0.0, None
     for offset, speed, reach, (positive, negative) in ways:

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import components
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.world.view import WorldView
 
@@ -154,8 +155,6 @@ def _unmatched(boxes: Sequence[Sequence[float]], view: WorldView, own: int | Non
 
 def _beside(x: float, y: float, body: Sequence[float]) -> bool:
     """True if a point is inside the outline of a body (7,) or at most GATE outside it."""
-    cos, sin = math.cos(body[6]), math.sin(body[6])
-    dx, dy = x - body[0], y - body[1]
-    ahead = max(abs(cos * dx + sin * dy) - body[3] / 2.0, 0.0)
-    aside = max(abs(cos * dy - sin * dx) - body[4] / 2.0, 0.0)
+    ahead, aside = components(x - body[0], y - body[1], body[6])
+    ahead, aside = max(abs(ahead) - body[3] / 2.0, 0.0), max(abs(aside) - body[4] / 2.0, 0.0)
     return ahead * ahead + aside * aside <= GATE * GATE

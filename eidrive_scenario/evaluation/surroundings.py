@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import components
 from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork
 from eidrive_scenario.roads.geometry.poses import lane_t
 from eidrive_scenario.world.view import WorldView
@@ -341,9 +342,8 @@ def _relation(name: str, a: _Body, b: _Body, *, wrong_way: bool = False) -> Rela
 
 def _straight(view: WorldView, row: int, other: int) -> tuple[_Body, _Body]:
     own, there = view.plain_boxes[row], view.plain_boxes[other]
-    dx, dy, yaw = there[0] - own[0], there[1] - own[1], own[6]
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    return _body(view, row, 0.0, 0.0, yaw), _body(view, other, cos * dx + sin * dy, cos * dy - sin * dx, yaw)
+    along, left = components(there[0] - own[0], there[1] - own[1], own[6])
+    return _body(view, row, 0.0, 0.0, own[6]), _body(view, other, along, left, own[6])
 
 
 def _body(view: WorldView, row: int, along: float, left: float, heading: float) -> _Body:
@@ -351,13 +351,10 @@ def _body(view: WorldView, row: int, along: float, left: float, heading: float) 
     _, _, _, length, width, _, yaw = view.plain_boxes[row]
     state = view.states[row]
     cos, sin = abs(math.cos(yaw - heading)), abs(math.sin(yaw - heading))
-    ahead, aside = math.cos(heading), math.sin(heading)
-    vx, vy = state.velocity_x, state.velocity_y
     return _Body(
         along,
         left,
         (length * cos + width * sin) / 2.0,
         (length * sin + width * cos) / 2.0,
-        ahead * vx + aside * vy,
-        ahead * vy - aside * vx,
+        *components(state.velocity_x, state.velocity_y, heading),
     )
