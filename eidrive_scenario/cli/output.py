@@ -26,6 +26,7 @@ from eidrive_scenario.errors import (
     most_similar,
     quoted,
 )
+from eidrive_scenario.files.atomic import standard_stream
 from eidrive_scenario.files.encodable import printable
 
 
@@ -42,6 +43,11 @@ def echo(message: object, *, err: bool = False, color: str = "") -> None:
     """
     text = printable(_with_option_names(str(message)))
     typer.echo(typer.style(text, fg=color) if color else text, err=err)
+
+
+def echo_path(path: str | os.PathLike[str], *, err: bool = False) -> None:
+    """Print the path of a written file on stdout, or on stderr if the file is stdout itself."""
+    echo(os.fspath(path), err=err or standard_stream(path) is not None)
 
 
 def _with_option_names(text: str) -> str:

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 from eidrive_scenario.cli.options import check_output_paths
-from eidrive_scenario.cli.output import echo, has_all_characters, print_warnings
+from eidrive_scenario.cli.output import echo, echo_path, has_all_characters, print_warnings
 from eidrive_scenario.errors import Diagnostic, SettingError
 
 
@@ -96,5 +96,5 @@ def export(
     check_output_paths({option: path for option, (path, _) in given.items()}, [run.recording.path])
     for path, write in given.values():
         write(run, path)
-        echo(str(path))
+        echo_path(path)
     print_warnings(dict.fromkeys(run.warnings))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from eidrive_scenario.cli.options import check_output_paths
-from eidrive_scenario.cli.output import echo, print_warning, print_warnings
+from eidrive_scenario.cli.output import echo, echo_path, print_warning, print_warnings
 from eidrive_scenario.errors import FAILED, PASSED, Diagnostic, SettingError
 
 if TYPE_CHECKING:
@@ -189,7 +189,7 @@ def compare(
             echo(line)
     if html is not None:
         write_comparison(comparisons, html)
-        echo(str(html), err=json or markdown)
+        echo_path(html, err=json or markdown)
     is_not_worse = all(
         named.comparison is not None and named.comparison.conclusion == NOT_WORSE for named in comparisons
     )

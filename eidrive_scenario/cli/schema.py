@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 from eidrive_scenario.cli.options import check_output_paths
-from eidrive_scenario.cli.output import echo, print_warnings
+from eidrive_scenario.cli.output import echo, echo_path, print_warnings
 
 
 def schema(
@@ -36,4 +36,4 @@ def schema(
         return
     with write_atomically(out) as stream:
         stream.write(f"{text}\n".encode())
-    echo(str(out))
+    echo_path(out)

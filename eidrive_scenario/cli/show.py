@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 from eidrive_scenario.cli.options import check_output_paths
-from eidrive_scenario.cli.output import echo, print_warning, print_warnings
+from eidrive_scenario.cli.output import echo, echo_path, print_warning, print_warnings
 from eidrive_scenario.errors import Diagnostic, SettingError
 
 PictureSize = Annotated[
@@ -130,7 +130,7 @@ def tree(
     roads = RoadNetwork.load(loaded.road_file) if loaded.road_file else None
     storyboard = Storyboard(loaded, roads, dt=0.05, seed=0)
     if svg is not None:
-        echo(str(write_storyboard_diagram(storyboard, svg)))
+        echo_path(write_storyboard_diagram(storyboard, svg))
     else:
         console().print(storyboard_tree(storyboard))
 
@@ -161,7 +161,7 @@ def draw(
     check_output_paths({"--out": picture}, [path])
     check_format("--out", picture)
     write_figure(source_figure(path, parse_size(size), station), picture)
-    echo(str(picture))
+    echo_path(picture)
 
 
 def view(
@@ -238,7 +238,7 @@ def view(
     print_warnings(f"{partial}: the run did not end, the recording is incomplete" for partial in partials)
     for written in (*stills.values(), gif, mp4, page):
         if written is not None:
-            echo(str(written))
+            echo_path(written)
     if browser and page is not None:
         typer.launch(page.resolve().as_uri())
 
@@ -286,4 +286,4 @@ def report(
         figures=figures,
         size=parse_size(size),
     )
-    echo(str(page))
+    echo_path(page)

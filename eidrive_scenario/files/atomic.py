@@ -102,12 +102,30 @@ class _NamedFile(io.FileIO):
 
 
 def create(path: str | os.PathLike[str]) -> BinaryIO:
-    """Open a new file for writing and create its folders. Raise OutputError if it cannot be written."""
+    """Open a new file for writing and create its folders. Raise OutputError if it cannot be written.
+
+    A path such as /dev/stdout continues the stream.
+    """
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
-        return io.BufferedWriter(_NamedFile(os.fspath(path), "w"))
+        return io.BufferedWriter(_NamedFile(os.fspath(path), "w", opener=_open))
     except OSError as error:
         raise OutputError(Diagnostic(f"cannot write: {error.strerror}", "choose another place", str(path))) from error
+
+
+def _open(path: str, flags: int) -> int:
+    # Opened again, the file of a redirected stream would be truncated and written from its start
+    stream = standard_stream(path)
+    return os.open(path, flags, 0o666) if stream is None else os.dup(stream)
+
+
+def standard_stream(path: str | os.PathLike[str]) -> int | None:
+    """Return the descriptor of standard output or error if a path leads there, such as /dev/stdout; else None."""
+    for descriptor in (1, 2):
+        with suppress(OSError):
+            if os.path.samestat(os.stat(path), os.fstat(descriptor)):
+                return descriptor
+    return None
 
 
 def partial_path(path: Path) -> Path:

@@ -50,6 +50,18 @@ def test_json_output_is_valid_in_any_encoding(passing_by: Path, tmp_path: Path) 
         assert json.loads(printed.stdout.decode(encoding))["scenario"] == copy.stem
 
 
+@pytest.mark.process
+def test_table_on_standard_output_continues_the_file_behind_it(passing_by: Path, tmp_path: Path) -> None:
+    assert eidrive("run", passing_by, "--out", tmp_path / "run").returncode == 0
+    table, standard_output = tmp_path / "table.csv", tmp_path / "output"
+    assert eidrive("export", tmp_path / "run", "--csv", table).stdout.decode() == f"{table}\n"
+    standard_output.write_bytes(b"former line\n")
+    with standard_output.open("ab") as stream:
+        exported = eidrive("export", tmp_path / "run", "--csv", "/dev/stdout", stdout=stream)
+    assert (exported.returncode, exported.stderr) == (0, b"/dev/stdout\n")
+    assert standard_output.read_bytes() == b"former line\n" + table.read_bytes()
+
+
 CONTROL = "a\x1b]0;x\x07\x9b31m\u202eb\x7f"
 ESCAPED = r"a\u001b]0;x\u0007\u009b31m\u202eb\u007f"
 
