@@ -19,6 +19,8 @@ from xml.etree import ElementTree
 
 import pytest
 from opendrive_xml import map_xml, road_xml
+from storyboard_xml import global_xml
+from street_scene import after
 from whole_run import RecordedRun, Run
 
 from eidrive_scenario.errors import InputError, SimulationError
@@ -60,11 +62,13 @@ def command(network: object = DATA / "four_way_signals.net.xml", routes: str = "
 def crossing(run: Run) -> Callable[..., RecordedRun]:
     """Run with routes of SUMO at a crossing with traffic lights; Ego stands in the lane that leads south."""
 
-    def played(routes: str, end: float = 12.0, *, init: str = command(), **parts: object) -> RecordedRun:
+    def played(
+        routes: str, end: float = 12.0, *steps: tuple[str, ...], init: str = command(), **parts: object
+    ) -> RecordedRun:
         (run.folder / "routes.rou.xml").write_text(f"<routes>{CAR}{routes}</routes>")
         roads = (library_path() / "roads/four_way_signals.xodr").read_text()
         stated = {"ego": (-1, 90.0, 0.0), "driven": False, "globally": init, "street": roads, **parts}
-        return run(end, **stated)  # type: ignore[arg-type]
+        return run(end, *steps, **stated)  # type: ignore[arg-type]
 
     return played
 
@@ -107,17 +111,34 @@ def test_positions_are_those_of_sumo_alone(run: Run, crossing: Callable[..., Rec
     assert categories["sumo.right"] == "bicycle"
 
 
+LEAVES = global_xml('<EntityAction entityRef="Other"><DeleteEntityAction/></EntityAction>')
+RETURNS = global_xml(
+    '<EntityAction entityRef="Other"><AddEntityAction><Position><LanePosition roadId="1" laneId="-2" s="70"/>'
+    "</Position></AddEntityAction></EntityAction>"
+)
+
+
 @needs_sumo
-def test_vehicle_of_sumo_stops_behind_a_standing_ego(crossing: Callable[..., RecordedRun]) -> None:
-    """With lane changes forbidden, it stops 2.5 m behind (minGap); Ego is a car of 4 m, whose center is its place."""
+@pytest.mark.parametrize(
+    ("standing", "steps"), [("Ego", ()), ("Other", (("Ego", LEAVES, after(0.5)), ("Ego", RETURNS, after(1.0))))]
+)
+def test_vehicle_of_sumo_stops_behind_a_standing_car(
+    crossing: Callable[..., RecordedRun], standing: str, steps: tuple[tuple[str, ...], ...]
+) -> None:
+    """With lane changes forbidden, it stops 2.5 m behind (minGap); the car has 4 m, and its center is its place.
+
+    So it does if the car has left and returned.
+    """
     forbidden = CAR.replace('"car"', '"careful"').replace("/>", ' lcKeepRight="0" lcSpeedGain="0" lcStrategic="-1"/>')
     trip = EAST.replace('type="car"', 'type="careful"')
-    played = crossing(forbidden + trip, 20.0, ego=(-2, 70.0, 0.0))
+    places = {"Ego": (1, 60.0, 0.0), "Other": (1, 90.0, 0.0), standing: (-2, 70.0, 0.0)}
+    ego, other = places.pop("Ego"), places
+    played = crossing(forbidden + trip, 20.0, *steps, ego=ego, others=other)
     last = played.frames[-1].view
     place = front(played, "sumo.east", -1)
     assert place is not None
-    ego = last.boxes[last.rows["Ego"]]
-    assert ego[0] - 0.5 * ego[3] - place[0] == pytest.approx(2.5, abs=0.3)
+    car = last.boxes[last.rows[standing]]
+    assert car[0] - 0.5 * car[3] - place[0] == pytest.approx(2.5, abs=0.3)
     assert last.speed[last.rows["sumo.east"]] == pytest.approx(0.0, abs=0.05)
 
 

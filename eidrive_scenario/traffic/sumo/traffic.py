@@ -222,10 +222,12 @@ class SumoTraffic:
             vehicle = f"{MIRRORED}.{name}"
             present.add(vehicle)
             if vehicle not in self._mirrored:
-                self._sumo.vehicletype.copy("DEFAULT_VEHTYPE", vehicle)
+                types = self._sumo.vehicletype
+                if vehicle not in types.getIDList():  # SUMO keeps that of an actor that has left
+                    types.copy("DEFAULT_VEHTYPE", vehicle)
                 for key, value in (("Length", length), ("Width", width), ("Height", height)):
-                    getattr(self._sumo.vehicletype, f"set{key}")(vehicle, max(value, 0.1))
-                self._sumo.vehicletype.setVehicleClass(vehicle, "ignoring")  # on every lane
+                    getattr(types, f"set{key}")(vehicle, max(value, 0.1))
+                types.setVehicleClass(vehicle, "ignoring")  # on every lane
                 vehicles.add(vehicle, MIRRORED, vehicle)
                 vehicles.setSpeedMode(vehicle, 0)
                 vehicles.setLaneChangeMode(vehicle, 0)
