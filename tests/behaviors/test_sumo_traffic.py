@@ -271,6 +271,14 @@ def test_size_without_a_body_is_an_error(crossing: Callable[..., RecordedRun], l
 
 
 @needs_sumo
+def test_error_of_sumo_during_the_run_aborts_it(crossing: Callable[..., RecordedRun]) -> None:
+    """The network has no sidewalks. The next run starts SUMO again."""
+    with pytest.raises(SimulationError, match="SUMO: Person 'walker' could not find sidewalk"):
+        crossing('<person id="walker" depart="1"><walk edges="-1"/></person>', 3.0)
+    crossing(EAST, 1.0)
+
+
+@needs_sumo
 def test_only_one_simulation_of_a_process_has_sumo(run: Run, crossing: Callable[..., RecordedRun]) -> None:
     crossing(EAST, 1.0)
     scenario = load_scenario(run.folder / "scene.xosc")

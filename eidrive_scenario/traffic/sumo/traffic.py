@@ -136,6 +136,7 @@ class SumoTraffic:
             import libsumo
 
         self._sumo: Any = libsumo
+        self._errors = libsumo.libsumo.TraCIException, libsumo.libsumo.FatalTraCIError
         self._roads = roads
         self._offset = files.offset
         self._taken = taken
@@ -170,7 +171,7 @@ class SumoTraffic:
             libsumo.start(["sumo", *(part for option in options.items() for part in option)])
             edges = [edge for edge in libsumo.edge.getIDList() if not edge.startswith(":")]
             libsumo.route.add(MIRRORED, edges[:1])
-        except libsumo.libsumo.TraCIException as error:
+        except self._errors as error:
             self.close()
             raise SimulationError(f"SUMO: {error}") from error
         self._lights = [TrafficLight(libsumo.trafficlight, name, signals) for name in libsumo.trafficlight.getIDList()]
@@ -187,7 +188,7 @@ class SumoTraffic:
             return changes
         try:
             self._advance(view, changes)
-        except self._sumo.libsumo.TraCIException as error:
+        except self._errors as error:
             raise SimulationError(f"SUMO: {error}") from error
         return changes
 
