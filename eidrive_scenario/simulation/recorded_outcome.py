@@ -265,7 +265,9 @@ def recorded_context(recording: Recording) -> CriteriaContext:
 def recorded_scope(recording: Recording) -> Scope:
     """Return the parameters of the run to which criteria on a recording refer. Those of a damaged one are unknown."""
     texts: Mapping[str, str] = _metadata(recording, "parameters", Mapping[str, str], {})
-    return Scope(parameters={name: Parameter(name, text, text, text) for name, text in texts.items()})
+    # Their types are not recorded. Expressions take numbers from texts, and truth values only as such
+    values = {text: {"true": True, "false": False}.get(text, text) for text in texts.values()}
+    return Scope(parameters={name: Parameter(name, text, values[text], text) for name, text in texts.items()})
 
 
 def _metadata(recording: Recording, name: str, kind: Any, unknown: _Entry) -> _Entry:
