@@ -31,16 +31,15 @@ _TOWED: Mapping[str, str] = {"trailer": "TYPE_TRAILER", "semitrailer": "TYPE_SEM
 """Types of trailers by the vehicle category of OpenSCENARIO."""
 _ENTITIES: Mapping[str, str] = {"pedestrian": "Pedestrian", "misc": "MiscObject"}
 """Types of the entities of OpenSCENARIO that are no vehicles, by category."""
-_GENERIC: Mapping[str, str] = {
-    "lowBeam": "head_light",
-    "highBeam": "high_beam",
-    "fogLights": "front_fog_light",
-    "fogLightsFront": "front_fog_light",
-    "fogLightsRear": "rear_fog_light",
-    "reversingLights": "reversing_light",
-    "licensePlateIllumination": "license_plate_illumination_rear",
+_GENERIC: Mapping[str, tuple[str, ...]] = {
+    "head_light": ("lowBeam",),
+    "high_beam": ("highBeam",),
+    "front_fog_light": ("fogLightsFront", "fogLights"),
+    "rear_fog_light": ("fogLightsRear", "fogLights"),
+    "reversing_light": ("reversingLights",),
+    "license_plate_illumination_rear": ("licensePlateIllumination",),
 }
-"""Lights with the states on and off, by the type of OpenSCENARIO."""
+"""Lights with the states on and off, by their types of OpenSCENARIO; `fogLights` is in recordings of older versions."""
 _ROLES: Mapping[str, str] = {
     "none": "CIVIL",
     "civil": "CIVIL",
@@ -160,9 +159,9 @@ def _set_lights(osi: Osi, state: Any, appearance: Appearance | None, role: str) 
         return
     kinds = osi.moving_object.VehicleClassification.LightState
     modes = {name: light.mode != "off" for name, light in appearance.lights.items()}
-    for name, field in _GENERIC.items():
-        if name in modes:
-            value = f"GENERIC_LIGHT_STATE_{'ON' if modes[name] else 'OFF'}"
+    for field, names in _GENERIC.items():
+        if (is_on := next((modes[name] for name in names if name in modes), None)) is not None:
+            value = f"GENERIC_LIGHT_STATE_{'ON' if is_on else 'OFF'}"
             setattr(state, field, kinds.GenericLightState.Value(value))
     if any(name in modes for name, _ in _INDICATORS):
         shown = next((word for name, word in _INDICATORS if modes.get(name)), "OFF")

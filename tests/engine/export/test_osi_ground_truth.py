@@ -260,6 +260,25 @@ def test_switched_lights_are_states(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("lights", "front", "rear"),
+    [
+        ({"fogLightsFront": "on", "fogLightsRear": "off"}, "ON", "OFF"),
+        ({"fogLightsRear": "on"}, "UNKNOWN", "ON"),
+        ({"fogLights": "on"}, "ON", "ON"),
+    ],
+)
+def test_fog_lights_are_those_at_the_front_and_rear(
+    tmp_path: Path, lights: dict[str, str], front: str, rear: str
+) -> None:
+    """`fogLights` comprises both. It is in recordings of older versions only."""
+    states = {name: LightState(name, mode) for name, mode in lights.items()}
+    (truth,) = exported(tmp_path, Frame(view({"A": {}}), appearances={"A": Appearance(states)}))
+    lit = truth.moving_object[0].vehicle_classification.light_state
+    named = [type(lit).GenericLightState.Name(value) for value in (lit.front_fog_light, lit.rear_fog_light)]
+    assert named == [f"GENERIC_LIGHT_STATE_{state}" for state in (front, rear)]
+
+
+@pytest.mark.parametrize(
     ("role", "color", "mode", "field", "state"),
     [
         ("police", None, "flashing", "emergency_vehicle_illumination", "FLASHING_BLUE"),
