@@ -37,6 +37,7 @@ _SHINES: Mapping[str, tuple[tuple[str, Light], ...]] = {
     "daytimeRunningLights": (("headlight", _DAY),),
     "lowBeam": (("headlight", HEADLIGHT), ("taillight", TAILLIGHT)),
     "highBeam": (("headlight", _HIGH), ("taillight", TAILLIGHT)),
+    "fogLights": (("headlight", HEADLIGHT), ("taillight", _REAR_FOG)),
     "fogLightsFront": (("headlight", HEADLIGHT),),
     "fogLightsRear": (("taillight", _REAR_FOG),),
     "brakeLights": (("taillight", _BRAKE),),
@@ -47,8 +48,9 @@ _SHINES: Mapping[str, tuple[tuple[str, Light], ...]] = {
     "licensePlateIllumination": (("plate", _PLATE),),
     "specialPurposeLights": (("blue_light", _BEACON),),
 }
-"""Light types of the standard, and the materials of the meshes that emit light; the action divides `fogLights`."""
-_BEAMS = ("lowBeam", "highBeam", "fogLightsFront")
+"""Light types of the standard, and the materials of the meshes that emit light; `fogLights` is in recordings of older
+versions."""
+_BEAMS = ("lowBeam", "highBeam", "fogLights", "fogLightsFront")
 
 
 def glow(spec: ActorSpec, appearance: Appearance, weather: Weather, time: float) -> Mapping[str, Light]:
