@@ -61,7 +61,7 @@ class TrackHistory:
         return max(self._names, key=lambda name: self._names[name])
 
     def record_scan(self, hit: bool, settings: TrackerSettings) -> None:
-        """Record whether the scan contained a detection of the object."""
+        """Record whether the scan, which could show the object, contained a detection of it."""
         self.hits += hit
         if not self.is_often_detected:
             self._recent = [*self._recent, hit][-settings.confirm[1] :]
@@ -76,9 +76,9 @@ class TrackHistory:
 
     def is_alive(self, now: float, settings: TrackerSettings) -> bool:
         """Return whether the track is kept."""
-        if self.is_often_detected:
-            return now - self._last_detection <= settings.coast + TIME_TOLERANCE
-        return self._recent.count(False) <= settings.confirm[1] - settings.confirm[0]
+        if now - self._last_detection > settings.coast + TIME_TOLERANCE:
+            return False
+        return self.is_often_detected or self._recent.count(False) <= settings.confirm[1] - settings.confirm[0]
 
 
 MODELS: Mapping[str, type[MovingModel]] = {"cv": ConstantVelocity, "ctrv": TurnRate}
@@ -179,12 +179,12 @@ class Tracker(TrackingMethod):
                 squared = float(squared_mahalanobis(offset, expected.covariance[row, :2, :2] + noise[column])[0])
                 noise[column] += (1.0 / self._gate - 1.0 / max(squared, self._gate)) * np.outer(offset, offset)
         hit = set(rows)
-        self._update_existence(expected, rows, detections, columns, noise, in_view)
+        share = self._update_existence(expected, rows, detections, columns, noise, in_view)
         if rows:
             self._tracks = self._filter.add_common_errors(self._tracks, rows, stated[columns])
             self._correct(rows, detections, columns, noise)
-        for row, history in enumerate(self._histories):
-            history.record_scan(row in hit, self.settings)
+        for row in np.flatnonzero(share > 0.0).tolist():
+            self._histories[row].record_scan(row in hit, self.settings)
         for row, column in zip(rows, columns, strict=True):
             self._histories[row].record_detection(detections, column)
         self._initiate(detections, [column for column in unassigned.tolist() if column not in on_bodies], noise)
@@ -243,9 +243,13 @@ class Tracker(TrackingMethod):
         columns: list[int],
         noise: Array,
         in_view: Callable[[Array], Array] | None,
-    ) -> None:
-        """Update the existence of all tracks; those in `rows` are detected."""
+    ) -> Array:
+        """Update the existence of all tracks; those in `rows` are detected.
+
+        Return the shares (N,) of the objects in view; those of detected ones are 1.
+        """
         settings = self.settings
+        share = np.ones(len(self._histories))
         if rows:
             offset = detections.boxes[columns, :2] - expected.state[rows, :2]
             spread = expected.covariance[rows][:, :2, :2] + noise[columns]
@@ -261,8 +265,10 @@ class Tracker(TrackingMethod):
             self._existence[rows] = detected(self._existence[rows], ratio)
         lost = np.setdiff1d(np.arange(len(self._histories)), rows)
         if len(lost):
-            share = 1.0 if in_view is None else np.clip(in_view(self._boxes(lost, expected.state[lost])), 0.0, 1.0)
-            self._existence[lost] = missed(self._existence[lost], settings.detection_probability * share)
+            if in_view is not None:
+                share[lost] = np.clip(in_view(self._boxes(lost, expected.state[lost])), 0.0, 1.0)
+            self._existence[lost] = missed(self._existence[lost], settings.detection_probability * share[lost])
+        return share
 
     def _boxes(self, rows: NDArray[np.intp] | list[int], state: Array) -> Array:
         """Return boxes (N, 7) of these tracks with these states (N, D)."""

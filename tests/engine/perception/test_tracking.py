@@ -107,6 +107,20 @@ def test_track_half_in_view_loses_less_existence() -> None:
     assert existence[0] > existence[1] > existence[2] > 0.5
 
 
+@pytest.mark.parametrize(("every", "reported"), [(4, 0.2), (12, None)])
+def test_only_scans_that_can_show_an_object_count_for_confirmation(every: int, reported: float | None) -> None:
+    """Of the scans at 20 Hz, those of a slower sensor show a car, and the others cannot.
+
+    Two detections in two scans at 5 Hz confirm it. At 1.67 Hz a detection is over after 0.5 s (`coast`).
+    """
+    track, first = tracker(), None
+    for tick in range(60):
+        shows = tick % every == 0
+        found = track.update(cars(tick * 0.05, *([(20, 0)] if shows else [])), partial(constant_share, float(shows)))
+        first = tick * 0.05 if len(found) and first is None else first
+    assert first == (reported and pytest.approx(reported))
+
+
 def test_existence_below_confirmation_is_not_reported() -> None:
     """Two detections of confidence 0.02 at a distance of 1.5 m are not reported; two of 0.8 are."""
     for score, reported in ((0.02, 0), (0.8, 1)):
