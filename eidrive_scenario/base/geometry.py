@@ -152,6 +152,22 @@ def iou_bev(a: Array, b: Array) -> Array:
     return np.divide(shared, union, out=np.zeros_like(shared), where=union > 0)
 
 
+LEVEL_TOLERANCE = 2.0
+"""Maximum vertical gap between two boxes of one object [m], since heights of detections have large errors."""
+
+
+@overload
+def on_two_levels(z: float, height: float, other_z: float, other_height: float) -> bool: ...
+@overload
+def on_two_levels(z: Array, height: Array, other_z: Array, other_height: Array) -> NDArray[np.bool_]: ...
+def on_two_levels(z: Any, height: Any, other_z: Any, other_height: Any) -> Any:
+    """Return whether boxes with these centers and heights [m] are on two levels, as on and below a bridge.
+
+    Arrays broadcast.
+    """
+    return abs(z - other_z) > 0.5 * (height + other_height) + LEVEL_TOLERANCE
+
+
 def points_in_polygon(points: Array, polygon: Array) -> NDArray[np.bool_]:
     """Return whether points (..., 2) are inside a polygon (M, 2) by the even-odd rule; it need not be convex."""
     points, polygon = np.asarray(points, dtype=float), np.asarray(polygon, dtype=float)

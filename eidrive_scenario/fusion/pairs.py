@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.base.assignment import assign
+from eidrive_scenario.base.geometry import on_two_levels
 
 Table = NDArray[np.void]
 """Structured array of tracks; see `fusion.tracks.TRACK`."""
@@ -21,8 +22,6 @@ UNASSIGNED_GATE = -2.0 * math.log(1e-6)
 
 One true pair in a hundred is outside a gate of 99 %, which would split objects many times per second.
 """
-LEVEL_TOLERANCE = 2.0
-"""Maximum vertical gap between two boxes of one object [m], since heights of detections have large errors."""
 _MAX_COORDINATE = 1e7
 """Maximum coordinate in the search by position [m], which rounding would affect beyond."""
 CERTAIN = -1e3
@@ -76,7 +75,7 @@ def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_stat
     x, y = own.x[rows] - other.x[columns], own.y[rows] - other.y[columns]
     limit = own.reach[rows] + other.reach[columns]
     body, other_body = first["body"][rows], second["body"][columns]  # z, length, width, height
-    apart = np.abs(body[:, 0] - other_body[:, 0]) > 0.5 * (body[:, 3] + other_body[:, 3]) + LEVEL_TOLERANCE
+    apart = on_two_levels(body[:, 0], body[:, 3], other_body[:, 0], other_body[:, 3])
     near = (x * x + y * y <= limit * limit) & ~apart
     certain = None
     if same_station and second["number"].max(initial=-1) >= 0:

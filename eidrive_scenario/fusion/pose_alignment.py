@@ -28,10 +28,10 @@ from msgspec.structs import replace
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.base.assignment import assign
 from eidrive_scenario.base.detections import CLASSES, VULNERABLE, Detections
-from eidrive_scenario.base.geometry import wrap_angle
+from eidrive_scenario.base.geometry import on_two_levels, wrap_angle
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.fusion.pairs import LEVEL_TOLERANCE, UNASSIGNED_GATE, AssociationGate, Table
+from eidrive_scenario.fusion.pairs import UNASSIGNED_GATE, AssociationGate, Table
 from eidrive_scenario.fusion.report_history import ReportHistory
 from eidrive_scenario.fusion.tracks import TRACK, initiate_tracks, predict_tracks
 from eidrive_scenario.perception.tracking.association import squared_mahalanobis
@@ -254,7 +254,7 @@ class _Candidates(NamedTuple):
         offset = other["mean"][:, None, :2] - own["mean"][:, :2]
         whole = spread + (jacobian @ np.swapaxes(jacobian, 1, 2))[:, None]
         body, own_body = other["body"][:, None], own["body"]  # z, length, width, height
-        apart = np.abs(body[..., 0] - own_body[:, 0]) > 0.5 * (body[..., 3] + own_body[:, 3]) + LEVEL_TOLERANCE
+        apart = on_two_levels(body[..., 0], body[..., 3], own_body[:, 0], own_body[:, 3])
         group, own_group = (_VULNERABLE[np.argmax(table["votes"], axis=1)] for table in (other, own))
         rows, columns = np.nonzero(
             (squared_mahalanobis(offset, whole)[0] <= UNASSIGNED_GATE) & ~apart & (group[:, None] == own_group)

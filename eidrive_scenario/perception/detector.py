@@ -13,7 +13,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.feature_map import FeatureMap, LatentCodec
-from eidrive_scenario.base.geometry import iou_bev
+from eidrive_scenario.base.geometry import iou_bev, on_two_levels
 from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import Readings, SignalReading
@@ -39,8 +39,11 @@ SAME_OBJECT = 0.1
 
 
 def without_duplicates(detections: Detections) -> Detections:
-    """Return the detections except those that overlap one with a higher score, in their order."""
-    overlap = iou_bev(detections.boxes, detections.boxes)
+    """Return the detections except those that overlap one on their level with a higher score, in their order."""
+    boxes = detections.boxes
+    overlap = iou_bev(boxes, boxes)
+    z, height = boxes[:, 2], boxes[:, 5]
+    overlap[on_two_levels(z[:, None], height[:, None], z, height)] = 0.0
     kept: list[int] = []
     for row in np.argsort(-detections.scores, kind="stable").tolist():
         if not kept or overlap[row, kept].max() <= SAME_OBJECT:

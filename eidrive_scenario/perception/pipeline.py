@@ -12,6 +12,7 @@ from msgspec.structs import replace
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.geometry import on_two_levels
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector
@@ -29,7 +30,8 @@ the width of a car: the center of another car is closer only after a collision."
 
 
 class Outline(NamedTuple):
-    """Outline of a body with the margin: center [m], cosine and sine of its heading, half length and half width [m]."""
+    """Outline of a body with the margin: center [m], cosine and sine of its heading, half length and half width, and
+    height of the center and of the body [m]."""
 
     x: float
     y: float
@@ -37,23 +39,25 @@ class Outline(NamedTuple):
     sin: float
     half_length: float
     half_width: float
+    z: float
+    height: float
 
 
 def outlines(bodies: Array) -> list[Outline]:
     """Return the outlines of bodies (K, 7)."""
     return [
-        Outline(x, y, math.cos(yaw), math.sin(yaw), length / 2.0 + BODY_MARGIN, width / 2.0 + BODY_MARGIN)
-        for x, y, _, length, width, _, yaw in bodies.tolist()
+        Outline(x, y, math.cos(yaw), math.sin(yaw), length / 2.0 + BODY_MARGIN, width / 2.0 + BODY_MARGIN, z, height)
+        for x, y, z, length, width, height, yaw in bodies.tolist()
     ]
 
 
 def rows_on_bodies(detections: Detections, bodies: Sequence[Outline]) -> list[int]:
-    """Return the rows of the detections whose centers are on bodies, or within the margin of them."""
+    """Return the rows of the detections whose centers are on bodies on their level, or within the margin of them."""
     rows = []
-    for row, (bx, by) in enumerate(detections.boxes[:, :2].tolist()):
-        for x, y, cos, sin, half_length, half_width in bodies:
+    for row, (bx, by, bz, _, _, tall, _) in enumerate(detections.boxes.tolist()):
+        for x, y, cos, sin, half_length, half_width, z, height in bodies:
             ahead, left = cos * (bx - x) + sin * (by - y), cos * (by - y) - sin * (bx - x)
-            if abs(ahead) <= half_length and abs(left) <= half_width:
+            if abs(ahead) <= half_length and abs(left) <= half_width and not on_two_levels(z, height, bz, tall):
                 rows.append(row)
                 break
     return rows

@@ -11,6 +11,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import VULNERABLE, Detections
+from eidrive_scenario.base.geometry import on_two_levels
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.fusion.pairs import UNASSIGNED_GATE, AssociationGate
 from eidrive_scenario.fusion.tracks import pose_part
@@ -74,9 +75,9 @@ class OwnBody:
         x, y, z = ego.position.tolist()
         reference = x, y, z, ego.yaw
         cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
-        ahead, aside, _ = self._spec.offset
+        ahead, aside, up = self._spec.offset
         x, y = x + cos * ahead - sin * aside, y + sin * ahead + cos * aside
-        body = Outline(x, y, cos, sin, *self._half_size)
+        body = Outline(x, y, cos, sin, *self._half_size, z + up, self._spec.size[2])
         trailers = outlines(attached) if len(attached) else ()
         driven = 0.0
         if self._poses:
@@ -169,8 +170,9 @@ class OwnBody:
         own: Detections | None,
         pose_covariance: Array | None,
     ) -> int | None:
-        """Return the row of the likeliest object within the gate, or None; own detections do not explain objects
-        `inside` the outline, which are not kept in any case.
+        """Return the row of the likeliest object within the gate and on the level of the body, or None.
+
+        Own detections do not explain objects `inside` the outline, which are not kept in any case.
 
         The gate refers to positions only: the first velocities of a track may be wrong.
         """
@@ -188,6 +190,8 @@ class OwnBody:
             if body is None:
                 here = self.at(detections.time)
                 body, body_velocity = np.array(here.body[:2]), np.array(here.velocity)
+            if on_two_levels(here.body.z, here.body.height, *detections.boxes[row, [2, 5]].tolist()):
+                continue
             covariance = _position_covariance(detections, row, state)
             position = detections.boxes[row, :2]
             spread = covariance if pose_covariance is None else covariance + pose_covariance[:2, :2]

@@ -32,11 +32,12 @@ LEAST_DEVIATION = 0.05
 
 
 def associate(
-    tracks: Estimates, confirmed: Bools, boxes: Array, noise: Array, gate: float
+    tracks: Estimates, confirmed: Bools, apart: Bools, boxes: Array, noise: Array, gate: float
 ) -> tuple[list[int], list[int]]:
     """Return the rows of associated tracks and boxes; confirmed tracks are assigned before others.
 
     tracks  (N,) predicted;  confirmed  (N,);  boxes (M, 7), and noise (M, 2, 2) of their positions
+    apart   (N, M) whether track and box are on two levels
     gate    maximum squared Mahalanobis distance
     """
     if not len(confirmed) or not len(boxes):
@@ -45,7 +46,7 @@ def associate(
     spread = tracks.covariance[:, None, :2, :2] + noise[None]
     distance, size = squared_mahalanobis(offset, spread)
     # Minus twice the log-likelihood: its normalization prevents that an uncertain track wins by its wide gate.
-    cost, inside = distance + np.log(size), distance <= gate
+    cost, inside = distance + np.log(size), (distance <= gate) & ~apart
     rows: list[int] = []
     columns: list[int] = []
     for group in (np.flatnonzero(confirmed), np.flatnonzero(~confirmed)):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.detections import VULNERABLE, Detections
-from eidrive_scenario.base.geometry import iou_bev, wrap_angle
+from eidrive_scenario.base.geometry import iou_bev, on_two_levels, wrap_angle
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.perception.tracking.association import (
     MOST,
@@ -166,16 +166,18 @@ class Tracker(TrackingMethod):
         noise = stated.copy()
         confirmed = np.array([history.number is not None for history in self._histories], dtype=bool)
         expected = self._filter.combined(self._tracks)
-        rows, columns = associate(expected, confirmed, detections.boxes, noise, self._gate)
+        boxes, shape = detections.boxes, self._shape
+        apart = on_two_levels(shape[:, :1], shape[:, 3:4], boxes[:, 2], boxes[:, 5])
+        rows, columns = associate(expected, confirmed, apart, boxes, noise, self._gate)
         unassigned = np.setdiff1d(np.arange(len(detections)), columns)
-        on_bodies = self._boxes_on_bodies(expected, confirmed, rows, unassigned, detections.boxes, noise)
+        on_bodies = self._boxes_on_bodies(expected, confirmed, apart, rows, unassigned, boxes, noise)
         for column, row in on_bodies.items():
             if row not in rows:
                 rows.append(row)
                 columns.append(column)
                 # It says that the object is there, and little about its place: as much as a box at the limit of the
                 # gate. If it said nothing, a track that falls behind its object would stay there.
-                offset = detections.boxes[column, :2] - expected.state[row, :2]
+                offset = boxes[column, :2] - expected.state[row, :2]
                 squared = float(squared_mahalanobis(offset, expected.covariance[row, :2, :2] + noise[column])[0])
                 noise[column] += (1.0 / self._gate - 1.0 / max(squared, self._gate)) * np.outer(offset, offset)
         hit = set(rows)
@@ -211,12 +213,15 @@ class Tracker(TrackingMethod):
         self,
         expected: Estimates,
         confirmed: Bools,
+        apart: Bools,
         detected: list[int],
         columns: NDArray[np.intp],
         boxes: Array,
         noise: Array,
     ) -> dict[int, int]:
         """Return which of the boxes in `columns` overlap with the body of a confirmed track, with its row.
+
+        apart  (N, M) whether track and box are on two levels
 
         Two bodies cannot overlap, so that they show this object: a part of it, or all of it outside the gate. A body
         without a detected box may be beside its place, by the error of its position relative to the box.
@@ -233,6 +238,7 @@ class Tracker(TrackingMethod):
         reach = bodies[:, None, 3:5] / 2.0 + SIGNIFICANT * deviation
         on_body = np.all(np.abs(np.einsum("tai,tbi->tba", axes, offset)) < reach, axis=-1)
         on_body |= iou_bev(bodies, boxes[columns]) > LARGEST_OVERLAP
+        on_body &= ~apart[np.ix_(tracks, columns)]
         return {int(columns[column]): int(tracks[row]) for row, column in np.argwhere(on_body).tolist()}
 
     def _update_existence(

@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from scipy.stats import chi2
 
 from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.perception.detector import without_duplicates
 from eidrive_scenario.perception.tracking.method import TrackerSettings
 from eidrive_scenario.perception.tracking.motion_models import ACCELERATION_DENSITY, TURN_DENSITY
 from eidrive_scenario.perception.tracking.tracker import Tracker
@@ -339,6 +340,27 @@ def test_boxes_on_the_body_of_a_track_are_no_other_objects() -> None:
     for scan in range(25, 28):
         held = track.update(cars(DT * scan, (20, 0), (14, 0)))
     assert held.tracks == (1, 2)
+
+
+@pytest.mark.parametrize(("height", "objects"), [(2.5, 1), (6.5, 2)])
+def test_box_above_a_body_is_another_object_on_a_bridge_only(height: float, objects: int) -> None:
+    """Errors of the height of a box by 2.5 m are no second car."""
+    track = tracker()
+    for scan in range(20):
+        detections = cars(DT * scan, (20.0, 0.0), *([(20.0, 0.5, math.pi / 2.0)] if scan >= 10 else []))
+        detections.boxes[1:, 2] += height
+        held = track.update(detections)
+    assert len(held) == len(without_duplicates(detections)) == objects
+
+
+def test_tracks_keep_their_level_when_a_car_passes_below_a_bridge() -> None:
+    track = tracker()
+    for scan in range(41):
+        detections = cars(DT * scan, (-20.0 + scan, 0.0), (0.0, 0.0, math.pi / 2.0))
+        detections.boxes[1, 2] += 6.5
+        held = track.update(detections)
+    assert held.tracks == (1, 2)
+    np.testing.assert_allclose(held.boxes[:, :3], [[20.0, 0.0, 0.75], [0.0, 0.0, 7.25]], atol=0.2)
 
 
 @pytest.mark.parametrize("speed", [3.0, 5.0])
