@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -111,17 +111,26 @@ def in_camera(boxes: Array, camera: CameraReading, others: Array) -> Array:
     return np.asarray(visible.mean(axis=1) * legible)
 
 
-def in_lidar(boxes: Array, lidar: LidarReading, half_field: float, reach: float, others: Array) -> Array:
-    """Return the share (N,) in [0, 1] of boxes (N, 7) that the lidar can show past the boxes `others` (M, 7).
+class LidarView(NamedTuple):
+    """View of a lidar: half its horizontal field of view, elevations of its lowest and its highest ring [rad], and its
+    range [m]."""
 
-    half_field  half its horizontal field of view [rad];  reach  its range [m]
-    """
+    half_field: float = math.pi
+    lowest: float = -math.pi / 2.0
+    highest: float = math.pi / 2.0
+    range: float = math.inf
+
+
+def in_lidar(boxes: Array, lidar: LidarReading, view: LidarView, others: Array) -> Array:
+    """Return the share (N,) in [0, 1] of boxes (N, 7) that the lidar can show past the boxes `others` (M, 7)."""
     if not len(boxes):
         return np.empty(0)
     points = points_of_boxes(boxes, POINTS)
-    local = LevelFrame.of(lidar.pose).to_local(points[..., :2])
-    bearing = np.abs(np.arctan2(local[..., 1], local[..., 0]))
-    visible = (bearing <= half_field) & (np.hypot(local[..., 0], local[..., 1]) <= reach)
+    x, y, z = np.moveaxis((points - lidar.pose[:3, 3]) @ lidar.pose[:3, :3], -1, 0)
+    plan = np.hypot(x, y)
+    elevation = np.arctan2(z, plan)
+    visible = (np.abs(np.arctan2(y, x)) <= view.half_field) & (np.hypot(plan, z) <= view.range)
+    visible &= (view.lowest <= elevation) & (elevation <= view.highest)
     visible &= ~_hidden(lidar.pose[:3, 3], points, boxes, others)
     return np.asarray(visible.mean(axis=1))
 

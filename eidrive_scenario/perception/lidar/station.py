@@ -13,7 +13,7 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.perception.geometry.lidar_geometry import Pattern, pattern_from_points, pattern_from_settings
-from eidrive_scenario.perception.geometry.projection import in_lidar
+from eidrive_scenario.perception.geometry.projection import LidarView, in_lidar
 from eidrive_scenario.sensing.readings import LidarReading, Readings
 from eidrive_scenario.sensing.settings import LidarSettings, SensorSettings
 
@@ -25,8 +25,7 @@ class StationLidars:
         lidars = {name: sensor for name, sensor in sensors.items() if isinstance(sensor, LidarSettings)}
         self._patterns = {name: pattern_from_settings(lidar) for name, lidar in lidars.items()}
         self._revolutions = {name: _Revolution(1.0 / lidar.rotation) for name, lidar in lidars.items()}
-        self._reach = {name: (math.radians(lidar.field_of_view) / 2.0, lidar.range) for name, lidar in lidars.items()}
-        """Half the field of view [rad] and the range [m] of each lidar."""
+        self._views = {name: _view(lidar) for name, lidar in lidars.items()}
         self._newest: dict[str, tuple[float, LidarReading]] = {}
         """Time [s] and points of the last revolution that `newest_revolutions` returned for each lidar."""
 
@@ -59,10 +58,16 @@ class StationLidars:
     def in_view(self, boxes: Array, readings: Readings, detections: Detections) -> Array:
         """Return the maximum share (N,) of each box (N, 7) that one of the lidars can show."""
         shares = [
-            in_lidar(boxes, reading, *self._reach.get(name, (math.pi, math.inf)), detections.boxes)
+            in_lidar(boxes, reading, self._views.get(name, LidarView()), detections.boxes)
             for name, reading in readings.lidars.items()
         ]
         return np.max(shares, axis=0) if shares else np.zeros(len(boxes))
+
+
+def _view(lidar: LidarSettings) -> LidarView:
+    rings = lidar.elevations or (lidar.lower_fov, lidar.upper_fov)
+    lowest, highest = math.radians(min(rings)), math.radians(max(rings))
+    return LidarView(math.radians(lidar.field_of_view) / 2.0, lowest, highest, lidar.range)
 
 
 def turning_each_step(sensors: Mapping[str, SensorSettings], dt: float) -> dict[str, SensorSettings]:

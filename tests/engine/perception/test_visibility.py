@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from eidrive_scenario.perception.geometry.projection import in_camera, in_lidar
+from eidrive_scenario.perception.geometry.projection import LidarView, in_camera, in_lidar
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading
 
 NONE = np.empty((0, 7))
@@ -65,9 +65,9 @@ def test_in_camera_small_object_is_out_of_view() -> None:
 def test_in_lidar_follows_field_of_view_range_and_shadow() -> None:
     half = math.radians(55.0)
     places = np.concatenate([box(20, 0), box(5, 20), box(60, 0)])
-    assert in_lidar(places, lidar(), half, 50.0, NONE).tolist() == [1.0, 0.0, 0.0]
-    assert in_lidar(places, lidar(), math.pi, 100.0, NONE).tolist() == [1.0, 1.0, 1.0]
-    assert in_lidar(box(20, 0), lidar(), half, 50.0, box(10, 0, (2.5, 8.0, 3.5)))[0] == 0.0
+    assert in_lidar(places, lidar(), LidarView(half, range=50.0), NONE).tolist() == [1.0, 0.0, 0.0]
+    assert in_lidar(places, lidar(), LidarView(range=100.0), NONE).tolist() == [1.0, 1.0, 1.0]
+    assert in_lidar(box(20, 0), lidar(), LidarView(half, range=50.0), box(10, 0, (2.5, 8.0, 3.5)))[0] == 0.0
 
 
 @pytest.mark.parametrize("angle", [0.4, 2.5])
@@ -81,10 +81,27 @@ def test_in_lidar_rotated_scene_has_equal_shares(angle: float) -> None:
         part[:, 6] += angle
     sensor = lidar()
     sensor.pose[:2, :2] = turn
-    straight = in_lidar(scene, lidar(), 0.5, 50.0, others)
-    np.testing.assert_allclose(in_lidar(turned[0], sensor, 0.5, 50.0, turned[1]), straight)
+    view = LidarView(0.5, range=50.0)
+    straight = in_lidar(scene, lidar(), view, others)
+    np.testing.assert_allclose(in_lidar(turned[0], sensor, view, turned[1]), straight)
+
+
+def test_in_lidar_object_below_lowest_ring_is_out_of_view() -> None:
+    """A mast of 6 m. Rays 30° downwards pass over a car 3 m away and show five of ten points of one 9 m away: those
+    1.4 m high from 8.0 m on, those 0.8 m high from 9.1 m, and those 0.2 m high from 10.1 m."""
+    mast, places = lidar(), np.concatenate([box(3, 0), box(9, 0), box(20, 0)])
+    mast.pose[2, 3] = 6.0
+    assert in_lidar(places, mast, LidarView(lowest=math.radians(-30.0)), NONE).tolist() == [0.0, 0.5, 1.0]
+
+
+def test_in_lidar_of_pitched_lidar_follows_its_axis() -> None:
+    """30° downwards from 6 m, the axis meets the ground at 10.4 m; rings up to 15° above it end at 22 m."""
+    mast, (cos, sin) = lidar(), (math.cos(math.radians(30.0)), math.sin(math.radians(30.0)))
+    mast.pose[:3, 0], mast.pose[:3, 2], mast.pose[2, 3] = (cos, 0.0, -sin), (sin, 0.0, cos), 6.0
+    view = LidarView(lowest=math.radians(-15.0), highest=math.radians(15.0))
+    assert in_lidar(np.concatenate([box(10, 0), box(30, 0)]), mast, view, NONE).tolist() == [1.0, 0.0]
 
 
 def test_shares_without_boxes_are_empty() -> None:
     assert in_camera(NONE, camera(), box(5, 0)).shape == (0,)
-    assert in_lidar(NONE, lidar(), 1.0, 50.0, NONE).shape == (0,)
+    assert in_lidar(NONE, lidar(), LidarView(1.0, range=50.0), NONE).shape == (0,)
