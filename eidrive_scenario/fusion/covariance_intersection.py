@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from pydantic import Field, PositiveFloat
 
-from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Bools, Integers
 from eidrive_scenario.base.detections import CLASSES, Detections
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.extensions.settings import Settings
@@ -101,7 +101,17 @@ class CovarianceIntersectionFusion(FusionMethod):
             senders = {report.station for report in reports if report.describes_sender}
             self._order = names, (*sorted(senders), *sorted(set(names) - senders)), len(senders)
         rows, ranks = self._history.select(self._order[1])
+        omitted = self._omitted(rows, ranks)
+        if omitted is not None:
+            rows, ranks = rows[~omitted], ranks[~omitted]
         return rows, np.maximum(ranks - (self._order[2] - 1), 0) if self._order[2] else ranks
+
+    def _omitted(self, rows: Integers, ranks: Integers) -> Bools | None:
+        """Return which tracks (N,) are omitted, None for none: those of objects in merged sensor data.
+
+        rows, ranks  (N,) of the tracks in the history, and of their stations in `_order[1]`
+        """
+        return None
 
 
 def _fuse_batch(

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import ClassVar, Literal
 
 import numpy as np
 from msgspec.structs import replace
 from pydantic import PositiveFloat
 
-from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Bools, Integers
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.geometry import points_in_box
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
@@ -18,7 +17,6 @@ from eidrive_scenario.fusion.covariance_intersection import (
     CovarianceIntersectionSettings,
 )
 from eidrive_scenario.fusion.feature_warp import Grid
-from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.lidar.segmentation import is_of_surface
 from eidrive_scenario.sensing.readings import LidarReading, Readings
@@ -97,16 +95,15 @@ class EarlyFusion(CovarianceIntersectionFusion):
         intensity = np.concatenate([first.intensity, np.ones(len(offset))])
         return replace(readings, lidars={name: LidarReading(points, intensity, first.pose)})
 
-    def _select(self, reports: Sequence[Report]) -> tuple[Integers, Integers]:
-        """Omit objects that are detected in merged points of their stations: within the grid of the detector, if it has
+    def _omitted(self, rows: Integers, ranks: Integers) -> Bools | None:
+        """Return which objects are in merged points of their stations and within the grid of the detector, if it has
         one.
         """
-        rows, ranks = super()._select(reports)
-        merged = np.array([station in self._merged for station in self._order[1]], np.bool_)[ranks]
+        merged: Bools = np.array([station in self._merged for station in self._order[1]], np.bool_)[ranks]
         features = None if self._detector is None else self._detector.feature_map
         if features is not None and merged.any():
             merged &= Grid.of(features).cells(self._history.positions(rows))[1]
-        return rows[~merged], ranks[~merged]
+        return merged
 
 
 def _surface_points(reading: LidarReading) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 from msgspec.structs import replace
 from pydantic import Field, PositiveFloat
 
-from eidrive_scenario.base.arrays import Array, Bools, Floats
+from eidrive_scenario.base.arrays import Array, Bools, Floats, Integers
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.feature_map import LatentCodec
 from eidrive_scenario.base.geometry import points_in_box
@@ -84,7 +84,7 @@ class IntermediateFusion(CovarianceIntersectionFusion):
 
     Received cells are placed on the grid of the station by the poses of both, and moved by the velocity of the reported
     box in which they are. `fuse_maps` of a derived class fuses them with the features of the station, and the detector
-    detects objects in the result. Boxes of other stations whose features are missing are fused by covariance
+    detects objects in the result. Boxes of other stations without features in the last result are fused by covariance
     intersection. The station reports only objects in its own features.
     """
 
@@ -101,6 +101,8 @@ class IntermediateFusion(CovarianceIntersectionFusion):
         self._grid: Grid | None = None
         """Grid of the last map of this station."""
         self._received: dict[str, _ReceivedMap] = {}
+        self._merged: dict[str, _ReceivedMap] = {}
+        """Maps of other stations in the last fused map that are not too old."""
         self._alone: Detections | None = None
         """Newest objects in the own features."""
         self._reports: dict[str, Report] = {}
@@ -182,26 +184,34 @@ class IntermediateFusion(CovarianceIntersectionFusion):
         held.present[rows, columns] = True
 
     def add_report(self, report: Report) -> None:
-        """Store the moving boxes of a report, and process its boxes whose features have not arrived.
+        """Store the moving boxes of a report, and process it.
 
         Out-of-sequence reports do not replace the moving boxes of a newer one.
         """
-        detections, station = report.detections, report.station
+        station = report.station
         newest = self._reports.get(station)
         # A report that is older by more than this is not late: the clock of its sender was set back.
-        if newest is None or not 0.0 < newest.detections.time - detections.time <= self.settings.max_age:
+        if newest is None or not 0.0 < newest.detections.time - report.detections.time <= self.settings.max_age:
             self._reports[station] = report
             self._boxes[station] = self._moving_boxes(report)
-        arrived = self._received.get(station)
-        if arrived is not None and len(detections) and arrived.time >= report.arrived - self.max_payload_age:
-            rows = np.flatnonzero(~self._covered(arrived, detections.boxes[:, :2])).tolist()
-            # By all of its boxes: those without features are too few, as most are not shared.
-            alignment = self._alignment(report)
-            if alignment is not None and alignment.is_corrected:
-                # Errors of successive corrections are independent at most.
-                report = replace(aligned_report(report, alignment), pose_change=2.0 * alignment.covariance)
-            report = replace(report, detections=report.detections.subset(rows))
-        super().add_report(report)
+        if station not in self._merged:
+            super().add_report(report)
+            return
+        # To the objects in the own features alone: those in the fused ones are partly its own.
+        alignment = self._alignment(report)
+        if alignment is not None and alignment.is_corrected:
+            # Errors of successive corrections are independent at most.
+            report = replace(aligned_report(report, alignment), pose_change=2.0 * alignment.covariance)
+        self._history.add_report(report)
+
+    def _omitted(self, rows: Integers, ranks: Integers) -> Bools | None:
+        """Return which objects are in the fused features of their stations."""
+        omitted = np.zeros(len(rows), np.bool_)
+        for rank, station in enumerate(self._order[1]):
+            if station in self._merged:
+                of_station = np.flatnonzero(ranks == rank)
+                omitted[of_station] = self._covered(self._merged[station], self._history.positions(rows[of_station]))
+        return omitted
 
     def _alignment(self, report: Report | None) -> PoseAlignment | None:
         """Return the pose of a sender, aligned to the objects in the own features; None if the pose is not aligned."""
@@ -223,22 +233,27 @@ class IntermediateFusion(CovarianceIntersectionFusion):
                 boxes[number] = _MovingBox(now, x, y, yaw, length, width, vx, vy)
         return boxes
 
-    def _covered(self, arrived: _ReceivedMap, points: Array) -> Bools:
+    def _covered(self, merged: _ReceivedMap, points: Array) -> Bools:
         """Return whether the features at points (N, 2) of the world are in the fused map."""
         inside = np.zeros(len(points), np.bool_) if self._grid is None else self._grid.cells(points)[1]
-        cells, in_map = arrived.grid.cells(points)
+        cells, in_map = merged.grid.cells(points)
         covered: Bools = inside & in_map
-        covered[covered] = arrived.present[tuple(cells[covered].T)]
+        covered[covered] = merged.present[tuple(cells[covered].T)]
         return covered
 
     def merge_readings(self, readings: Readings, alone: Detections | None = None) -> Readings:
         """Return the readings with fused features; without lidars if there are no new features."""
         self._alone = self._alone if alone is None else alone
+        oldest = readings.time - self.max_payload_age - TIME_TOLERANCE
+        self._received = {sender: held for sender, held in self._received.items() if held.time >= oldest}
+        self._merged = {sender: held for sender, held in self._merged.items() if held.time >= oldest}
         features = readings.features
         if features is None:
             return replace(readings, lidars={})
-        oldest = readings.time - self.max_payload_age - TIME_TOLERANCE
-        self._received = {sender: held for sender, held in self._received.items() if held.time >= oldest}
+        # Cells that arrive later are not in the fused map.
+        self._merged = {
+            sender: dataclasses.replace(held, present=held.present.copy()) for sender, held in self._received.items()
+        }
         self._grid = Grid.of(features)
         if not self._received:
             return readings

@@ -264,8 +264,10 @@ def test_objects_in_merged_points_arrive_with_the_own_message() -> None:
     assert math.dist(fused[1][0], CAR) < 0.5
 
 
-def test_boxes_of_a_station_beyond_the_grid_of_the_detector_are_fused() -> None:
-    """The grid ends 51.2 m from the ego; points of the station are merged, and it reports cars 40 m and 60 m ahead."""
+@pytest.mark.parametrize("senders", [(), (100.0, 110.0)])
+def test_boxes_of_a_station_beyond_the_grid_of_the_detector_are_fused(senders: tuple[float, ...]) -> None:
+    """The grid ends 51.2 m from the ego; points of the station are merged, and it reports cars 40 m and 60 m ahead.
+    Others that report themselves change nothing about that."""
     fusion, detector = EarlyFusion(), CellDetector()
     fusion.setup(detector)
     own = readings(0.0, (0.0, 0.0, 0.0))
@@ -275,9 +277,13 @@ def test_boxes_of_a_station_beyond_the_grid_of_the_detector_are_fused() -> None:
     seen = Detections(0.0, boxes, np.ones(2), ("car",) * 2, np.zeros((2, 2)), np.tile(0.1 * np.eye(2), (2, 1, 1)))
     fusion.add_payload("RSU", fusion.payloads(far, 1400)[0], np.zeros(7))
     fusion.merge_readings(own)
-    report = Report("RSU", seen, 0.0)
-    fusion.add_report(report)
-    assert fusion.fuse([report], 0.0).boxes[:, 0].tolist() == [60.0]
+    reports = [Report("RSU", seen, 0.0)]
+    for x in senders:
+        itself = replace(seen.subset([0]), boxes=boxes[:1] + np.array([x - 40.0, *[0.0] * 6]))
+        reports.append(Report(f"{x} itself", itself, 0.0, describes_sender=True))
+    for report in reports:
+        fusion.add_report(report)
+    assert sorted(fusion.fuse(reports, 0.0).boxes[:, 0].tolist()) == [60.0, *senders]
 
 
 def test_points_of_the_far_future_do_not_replace_later_ones() -> None:

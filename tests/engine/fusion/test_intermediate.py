@@ -241,6 +241,22 @@ def test_boxes_without_features_are_fused() -> None:
     assert near(reports["Ego"].detections.boxes, (20.0, 4.0))
 
 
+@pytest.mark.parametrize("has_scanned", [False, True])
+def test_boxes_of_a_station_are_fused_until_its_features_are(has_scanned: bool) -> None:
+    """The own lidar has no reading in the tick in which they arrive. The features show the object at 20 m, the box at
+    30 m."""
+    boxes, *messages = sent(MASTS[0], 0.05, (20.0, 4.0))
+    box = replace(boxes.detections, boxes=boxes.detections.boxes + np.array([10.0, *[0.0] * 6]))
+    inbox = received([replace(boxes, detections=box), *messages], 0.1)
+    ego = agent(EGO)
+    if has_scanned:
+        ego.act(readings(0.0, HERE), (), 0.0, None)
+    waiting = ego.act(replace(readings(0.1, HERE), lidars={}), inbox, 0.1, None).fused
+    merged = ego.act(readings(0.15, HERE), (), 0.15, None).fused
+    assert near(waiting.boxes, (30.0, 4.0))
+    assert near(merged.boxes, (20.0, 4.0))
+
+
 @pytest.mark.parametrize("fusion", ["average", "covariance_intersection", "early"])
 def test_station_without_features_is_fused_by_its_boxes(fusion: str) -> None:
     messages = sent(MASTS[0], 0.0, (20.0, 4.0), fusion=fusion)
