@@ -64,7 +64,6 @@ class Agent:
         self.sharing = sharing
         self.message_generator = message_generator
         self._detections: Detections | None = None
-        self._has_measured = False
         self._regions: PerceptionRegionStore | None = None
         if planner is not None and planner.observes_regions:
             self._regions = PerceptionRegionStore()
@@ -134,7 +133,6 @@ class Agent:
         fresh = self.perception.perceive(readings)
         if fresh is not None or self._detections is None:  # nothing is measured before the first detections
             self._detections = Detections(now) if fresh is None else fresh
-        self._has_measured = self._has_measured or fresh is not None
         detections = self._detections
         covariance = self.perception.pose_covariance
         expired = self._reports.process(inbox, now, ego, pose_covariance=covariance, own_perception=own_perception)
@@ -149,7 +147,8 @@ class Agent:
             change = self.perception.pose_change(own.time)
             self._reports.add(Report(self.name, own, now, own_state, pose_change=change))
             if self._regions is not None:
-                self._regions.add(self.name, own.time, self._own_body.at(own.time).reference, self._view)
+                measured = self.perception.measured
+                self._regions.add(self.name, measured, self._own_body.at(measured).reference, self._view)
         elif own is not None and self.sharing is not None:
             self._reports.keep_joint(own, now)
         obeys = self.planner is not None and self.settings.obey_signals
@@ -208,7 +207,7 @@ class Agent:
                 now,
                 () if self.sharing is None else self.sharing.own,
                 interval=perceived.message_interval,
-                has_measured=self._has_measured,
+                measured=self.perception.measured,
             )
             if action.send
             else (),

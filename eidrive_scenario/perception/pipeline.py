@@ -109,6 +109,8 @@ class Perception:
         self._pose_errors = PoseErrors()
         self.pose: PoseUncertainty | None = None
         """Uncertainty of the pose that `locate` returned last; None: it is exact."""
+        self.measured = -math.inf
+        """Time of the last readings whose objects are available [s]; later objects are predictions of the tracker."""
         self._computing: deque[tuple[float, Detections, Readings]] = deque()
 
     @property
@@ -196,6 +198,7 @@ class Perception:
         return newest
 
     def _track(self, detections: Detections, readings: Readings) -> Detections:
+        self.measured = readings.time
         if self._tracker is None:
             if self.detector.velocity_deviation is None:
                 return detections

@@ -89,7 +89,7 @@ class MessageGenerator:
         payloads: tuple[Payload, ...] = (),
         *,
         interval: float = 0.0,
-        has_measured: bool = True,
+        measured: float = math.inf,
     ) -> tuple[Message, ...]:
         """Return the messages of this tick.
 
@@ -97,14 +97,15 @@ class MessageGenerator:
                   its own message
         interval  minimum time between two messages under congestion control [s], respected by the ETSI rules. With two
                   kinds of messages only the less recent kind is generated in a tick
-        has_measured  whether the detector has returned a result: before it, CPMs do not list sensors, whose sectors
-                  would count as perceived
+        measured  time of the last readings in the detections [s]: before the first ones, CPMs do not list sensors,
+                  whose sectors would count as perceived
         """
         if self._first == math.inf:
             self._first = now + self._phase
         if now < self._first - EQUAL:
             return ()
         etsi = self._settings.generation == "etsi"
+        has_measured = measured > -math.inf
         if not etsi and not self._is_due_by_rate(now):
             return ()
         interval = min(interval, LONGEST)
@@ -131,6 +132,8 @@ class MessageGenerator:
                 messages = [self._message(state, own_body(self._spec, state), now, "cam", low_frequency=low)]
             if not messages:
                 continue
+            if kind == "cpm" and has_measured and measured < detections.time:
+                messages = [replace(message, measured=measured) for message in messages]
             if kind == "cpm" and payloads is not self._sent:
                 self._sent = payloads
                 messages += self._feature_messages(state, now, payloads)

@@ -106,8 +106,8 @@ class PerceptionRegionStore:
             self._regions[station] = PerceptionRegion(station, time, placed)
 
     def add_message(self, message: Message, arrived: float) -> None:
-        """Store the region of a CPM, which is not later than its arrival, also if the clock of its sender is fast.
-        Without information about the sensors of its sender it has none.
+        """Store the region of a CPM at its last measurement, not later than its arrival, also if the clock of its
+        sender is fast. Without information about the sensors of its sender it has none.
 
         The message has the pose of the sender at its generation; since the measurement it drove straight on.
         """
@@ -117,7 +117,8 @@ class PerceptionRegionStore:
             self._sensors[message.sender] = message.sensors
         sectors = self._sensors.get(message.sender, ())
         if sectors:
-            state, time = message.state, message.detections.time
+            state = message.state
+            time = message.detections.time if message.measured is None else message.measured
             driven = state.speed * (state.time - time)
             x, y = state.x - driven * math.cos(state.yaw), state.y - driven * math.sin(state.yaw)
             self.add(message.sender, min(time, arrived), (x, y, state.z, state.yaw), sectors)

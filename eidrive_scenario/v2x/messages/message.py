@@ -63,6 +63,8 @@ class Message(msgspec.Struct, frozen=True, gc=False):
     """Shared lidar point cloud of the sender, included in `size`; None if it is not shared."""
     sensors: tuple[ViewSector, ...] | None = None
     """Sensor information of a CPM: sectors that the sender perceives, in its own frame; None: not in this message."""
+    measured: float | None = None
+    """Station time of the last measurement of the sender, if its objects are predicted from it [s]."""
     offset: float = 0.0
     """Time from the time step of the message until the sender passes it to the radio [s]; radio models include it."""
     features: FeatureFrame | None = None
@@ -139,6 +141,7 @@ def shift_timestamps(message: Message, error: float) -> Message:
     )
     return replace(
         message,
+        measured=None if message.measured is None else message.measured + error,
         detections=replace(message.detections, time=message.detections.time + error),
         state=replace(message.state, time=message.state.time + error),
         points=points,

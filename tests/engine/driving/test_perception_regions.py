@@ -93,6 +93,21 @@ def test_region_is_where_the_sender_was_at_its_measurement() -> None:
     assert (region.sectors[0].x, region.sectors[0].y) == pytest.approx((10.0, 7.0 - 10.0))
 
 
+def test_predictions_between_two_scans_do_not_renew_the_region() -> None:
+    """A tracked sensor with one reading in 2 s: the region of the only reading at 0 s ends after 1 s."""
+    rsu, store = station(sensors={"truth": {"rate": 0.5}}, tracker="cv"), PerceptionRegionStore()
+    box = np.array([[15.0, 20.0, 0.75, 4.9, 1.8, 1.5, 0.0]])
+    times = []
+    for tick in range(30):
+        now = tick * 0.05
+        truth = None if tick else TruthReading(("Car",), ("car",), box, np.zeros((1, 2)), np.ones(1))
+        ego = EgoState(now, np.zeros(3), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        for message in rsu.act(Readings(now, ego, truth), (), now, None).outbox:
+            store.add_message(message, now)
+        times.append([region.time for region in store.newest(now)])
+    assert times == [[0.0]] * 21 + [[]] * 9
+
+
 def test_cam_has_no_region() -> None:
     store = PerceptionRegionStore()
     state = StationState(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
