@@ -60,6 +60,8 @@ MIN_EXISTENCE = 0.05
 """Minimum existence probability of a track; below, it is deleted, as by `delete_existence` of trackers."""
 MAX_WEIGHT = 10.0
 """Maximum weight of earlier reports of the size, so that it can still change."""
+MAX_LATERAL_ACCELERATION = 9.81
+"""Maximum lateral acceleration of a turn [m/s²]: that of tires with a friction coefficient of 1."""
 _ROW = np.dtype((np.void, TRACK.itemsize))
 Rows = NDArray[np.void]
 """Rows of a table as bytes: numpy copies them at once, and those of a table field by field."""
@@ -163,6 +165,9 @@ def predict_tracks(tracks: Table, time: Array) -> None:
         tracks[name] for name in ("mean", "covariance", "heading", "heading_covariance")
     )
     turn = significant_turn_rate(heading, of_heading)
+    # A faster turn than tires allow is one of boxes only: of axes that jump, or that turn by half a circle per report.
+    impossible = np.abs(turn) * np.hypot(mean[:, 2], mean[:, 3]) > MAX_LATERAL_ACCELERATION
+    heading[impossible, 1] = turn[impossible] = 0.0
     turning = _of_receivers_with(turn != 0.0, tracks["receiver"])
     mean[:], covariance[:] = predict(mean, covariance, step, turn, turning)
     heading[:], of_heading[:] = predict_heading(heading, of_heading, step)

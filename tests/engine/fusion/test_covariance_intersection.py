@@ -163,6 +163,13 @@ def test_fuse_predicts_turning_car_along_the_arc(report: Make, fuse: Fuse) -> No
     np.testing.assert_allclose(fused.velocity[0], [8.0 * math.cos(1.04), 8.0 * math.sin(1.04)], atol=0.3)
 
 
+def test_fuse_predicts_no_turn_that_tires_do_not_allow(report: Make, fuse: Fuse) -> None:
+    """Boxes of a car at 12 m/s turn by 3.5 rad/s, which would be 42 m/s² across; its velocity does not turn."""
+    times = np.arange(0.0, 0.301, 0.05).tolist()
+    reports = [report("A", t, [(12.0 * t, 0.0)], yaw=3.5 * t, velocity=(12.0, 0.0)) for t in times]
+    np.testing.assert_allclose(fuse(reports, 0.7).boxes[0, :2], (12.0 * 0.7, 0.0), atol=1e-6)
+
+
 def test_fuse_covariance_grows_with_the_age_of_the_report(report: Make, fuse: Fuse) -> None:
     """Closed form P + T² P_v + q T³/3: (0.04 + 0.09 · 0.25 + 6 · 0.009) m²."""
     fused = fuse([report("A", 0.0, [(0.0, 0.0)], velocity=(10.0, 0.0))], 0.3)
