@@ -13,7 +13,7 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import wrap_angle
 
 NOT_ESTIMATED: Array = np.empty(0)
-"""Existence of objects for which no tracker and no fusion method has estimated it."""
+"""Existence, and variance of the velocity, of objects for which no tracker and no fusion method has estimated it."""
 NOT_ESTIMATED.flags.writeable = False
 
 CLASSES = ("car", "truck", "bus", "van", "motorbike", "bicycle", "pedestrian", "misc")
@@ -34,6 +34,7 @@ class Detections(msgspec.Struct, frozen=True, gc=False):
     existence   (N,) probability of existence in [0, 1]; empty (0,) if it is not estimated
     velocity_deviation  standard deviation in each axis [m/s] of velocities that are measurements of this instant alone;
                         None for exact ones, and for states of a filter, which contain earlier measurements
+    velocity_variance  (N,) in each axis [m²/s²] of velocities that are states of a filter; empty (0,) if not estimated
     """
 
     time: float
@@ -45,6 +46,7 @@ class Detections(msgspec.Struct, frozen=True, gc=False):
     tracks: tuple[int, ...] = ()
     existence: Array = msgspec.field(default_factory=lambda: NOT_ESTIMATED)
     velocity_deviation: float | None = None
+    velocity_variance: Array = msgspec.field(default_factory=lambda: NOT_ESTIMATED)
 
     def __post_init__(self) -> None:
         count = len(self.boxes)
@@ -62,6 +64,9 @@ class Detections(msgspec.Struct, frozen=True, gc=False):
             raise ValueError(f"{len(self.tracks)} tracks for {count} boxes")
         if self.existence is not NOT_ESTIMATED and self.existence.shape not in ((count,), (0,)):
             raise ValueError(f"existence has shape {self.existence.shape}, expected {(count,)} or (0,)")
+        if self.velocity_variance is not NOT_ESTIMATED and self.velocity_variance.shape not in ((count,), (0,)):
+            shape = self.velocity_variance.shape
+            raise ValueError(f"velocity_variance has shape {shape}, expected {(count,)} or (0,)")
         if self.velocity_deviation is not None and not 0.0 < self.velocity_deviation < math.inf:
             raise ValueError(f"velocity_deviation is {self.velocity_deviation}, expected a positive number or None")
 
@@ -89,6 +94,7 @@ class Detections(msgspec.Struct, frozen=True, gc=False):
             tuple([number for part in parts for number in part.tracks]),
             np.concatenate([part.confidence for part in parts]) if is_estimated else NOT_ESTIMATED,
             parts[-1].velocity_deviation,
+            np.concatenate([part.velocity_variance for part in parts]),
         )
 
     def move(self, before: Array, after: Array, turn: float) -> Detections:
@@ -119,4 +125,5 @@ class Detections(msgspec.Struct, frozen=True, gc=False):
             tuple([self.tracks[row] for row in rows]) if self.tracks else (),
             self.existence.take(picked) if len(self.existence) else NOT_ESTIMATED,
             self.velocity_deviation,
+            self.velocity_variance.take(picked) if len(self.velocity_variance) else NOT_ESTIMATED,
         )

@@ -17,7 +17,7 @@ from eidrive_scenario.fusion.covariance import covariances, estimates, fuse, mea
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.fusion.pairs import AssociationGate, Objects, Table, group_tracks
 from eidrive_scenario.fusion.pose_alignment import PoseAligner
-from eidrive_scenario.fusion.prediction import REPORT_LIFETIME, fuse_headings
+from eidrive_scenario.fusion.prediction import REPORT_LIFETIME, fuse_headings, is_predictable
 from eidrive_scenario.fusion.report_history import ReportHistory
 from eidrive_scenario.fusion.tracks import TRACK, predict_tracks, rows_of
 
@@ -139,9 +139,13 @@ def _fuse_batch(
     recent = now - tracks["seen"] <= settings.max_age + TIME_TOLERANCE
     if not recent.all():
         tracks = tracks.take(np.flatnonzero(recent))
+    predict_tracks(tracks, np.full(len(tracks), now))
+    # The first velocities of a tracker are uncertain. Without a further report such an object may be anywhere soon.
+    lasting = ~tracks["judged"] | is_predictable(tracks["covariance"], now - tracks["seen"], settings.max_age)
+    if not lasting.all():
+        tracks = tracks.take(np.flatnonzero(lasting))
     if not len(tracks):
         return [Detections(now) for _ in methods]
-    predict_tracks(tracks, np.full(len(tracks), now))
     objects = group_tracks(tracks, gate)
     fused = _fuse_objects(tracks, objects, now, gate.chi_square)
     likely = fused.existence >= settings.existence

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.geometry import wrap_angle
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.perception.tracking.motion_models import (
     ACCELERATION_DENSITY,
     HEADING_DEVIATION,
@@ -40,6 +41,21 @@ and the predicted box of a car does not overlap with the car any more.
 
 One lost message about an object at rest, which is reported once per second (ETSI TS 103 324, T_GenCpmMax), is bridged.
 """
+
+
+def is_predictable(covariance: Array, age: Array, max_age: float) -> Bools:
+    """Return whether tracks (N,) are predicted as precisely as an object with a reported velocity for `max_age` [s].
+
+    covariance  (N, 4, 4) after the prediction by `age` (N,) [s]
+
+    Their velocities had the variance v² in each axis, so that prediction has added v² t² + ACCELERATION_DENSITY t³ / 3
+    to each coordinate of their positions.
+    """
+    age = np.abs(age)
+    variance = 0.5 * (covariance[:, 2, 2] + covariance[:, 3, 3]) - ACCELERATION_DENSITY * age
+    added = variance * age**2 + ACCELERATION_DENSITY * age**3 / 3.0
+    limit = KNOWN_SPEED**2 * max_age**2 + ACCELERATION_DENSITY * max_age**3 / 3.0
+    return np.asarray(added <= limit + EPSILON)
 
 
 def predict(mean: Array, covariance: Array, step: Array, turn: Array, turning: Bools) -> tuple[Array, Array]:

@@ -118,7 +118,12 @@ def _converted(reports: Sequence[Report]) -> Table:
     table["mean"][:, 2:] = np.where(moving[:, None], velocity, 0.0)
     table["measured"] = moving & np.repeat([detections.velocity_deviation is not None for detections in lists], counts)
     deviation = np.repeat([detections.velocity_deviation or KNOWN_SPEED for detections in lists], counts)
-    covariance[:, 2, 2] = covariance[:, 3, 3] = np.where(moving, deviation, UNKNOWN_SPEED) ** 2
+    variance = np.where(moving, deviation, UNKNOWN_SPEED) ** 2
+    if any([len(detections.velocity_variance) for detections in lists]):
+        estimated = np.repeat([len(detections.velocity_variance) > 0 for detections in lists], counts)
+        stated = np.concatenate([detections.velocity_variance for detections in lists])
+        variance[estimated] = np.maximum(variance[estimated], stated)
+    covariance[:, 2, 2] = covariance[:, 3, 3] = variance
     table["heading"], table["heading_covariance"] = initiate_heading(boxes[:, 6])
     table["facing"] = 1.0
     table["station"] = np.repeat(np.arange(len(reports)), counts)

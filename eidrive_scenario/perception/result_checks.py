@@ -38,7 +38,7 @@ def check_detections(extension: object, method: str, detections: object, *, now:
     now  time after which nothing can have been measured [s]; None: fused reports, whose clocks may be fast
 
     Sizes are in [0, LARGEST_SIZE], scores and existence in [0, 1], variances at least 0, and no coordinate or speed
-    exceeds LARGEST. Velocity and covariance may be NaN.
+    exceeds LARGEST. Velocity and covariance may be NaN; the variance of the velocity may not.
     """
     if not isinstance(detections, Detections):
         raise InvalidResult(extension, method, f"returned {describe(detections)} (expected Detections)")
@@ -61,6 +61,7 @@ def check_detections(extension: object, method: str, detections: object, *, now:
             "existence": detections.existence,
             "velocity": _without_nan(detections.velocity),
             "covariance": _without_nan(detections.covariance),
+            "velocity_variance": detections.velocity_variance,
         },
     )
     variances = detections.covariance.reshape(-1, 4)[:, ::3]
@@ -71,6 +72,7 @@ def check_detections(extension: object, method: str, detections: object, *, now:
     raise_outside(extension, method, "velocity", detections.velocity, -LARGEST, LARGEST)
     raise_outside(extension, method, "covariance", detections.covariance, -(LARGEST**2), LARGEST**2)
     raise_outside(extension, method, "a variance", variances, 0.0, LARGEST**2)
+    raise_outside(extension, method, "velocity_variance", detections.velocity_variance, 0.0, LARGEST**2)
 
 
 def check_array(extension: object, method: str, name: str, values: object, shape: tuple[int, ...]) -> None:
@@ -123,7 +125,7 @@ def describe(value: object) -> str:
 
 def _is_in_range(detections: Detections) -> bool:
     """Return whether all numbers of at least one object are certainly in range; each line is False for NaN."""
-    boxes, covariance = detections.boxes, detections.covariance
+    boxes, covariance, variance = detections.boxes, detections.covariance, detections.velocity_variance
     sizes = boxes[:, 3:6]
     return bool(
         are_within(boxes, LARGEST)
@@ -134,6 +136,7 @@ def _is_in_range(detections: Detections) -> bool:
         and not (np.abs(detections.velocity) > LARGEST).any()
         and not (np.abs(covariance) > LARGEST**2).any()
         and not (covariance.reshape(-1, 4)[:, ::3] < 0.0).any()
+        and (not variance.size or (are_within(variance, LARGEST**2) and variance.min() >= 0.0))
     )
 
 
@@ -143,7 +146,7 @@ def _are_probabilities(values: Array) -> bool:
 
 def _check_rows(extension: object, method: str, detections: Detections) -> None:
     """Raise InvalidResult unless arrays are numeric, classes are known, and track numbers are integers."""
-    for name in ("boxes", "scores", "velocity", "covariance", "existence"):
+    for name in ("boxes", "scores", "velocity", "covariance", "existence", "velocity_variance"):
         array = getattr(detections, name)
         if array.dtype.kind not in _REAL:
             raise InvalidResult(extension, method, f"returned {name} as {describe(array)} (expected numbers)")

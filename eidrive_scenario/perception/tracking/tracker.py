@@ -347,15 +347,17 @@ class Tracker(TrackingMethod):
         histories = [self._histories[row] for row in rows]
         state, covariance = self._filter.combined(tracks)
         recent = np.array([history.hits < SETTLED and history.name not in SLOW for history in histories], dtype=bool)
+        velocity = self._filter.velocity(tracks, recent, _axes(self._shape[rows, 4])[:, 1])
         return Detections(
             time,
             self._boxes(rows, state),
             np.array([history.score for history in histories]) * existence,
             tuple([history.name for history in histories]),
-            self._filter.velocity(tracks, recent, _axes(self._shape[rows, 4])[:, 1]),
+            velocity,
             covariance[:, :2, :2],
             tuple([history.number or 0 for history in histories]),
             existence,
+            velocity_variance=self._filter.velocity_variance(tracks, velocity),
         )
 
 

@@ -19,6 +19,7 @@ from eidrive_scenario.fusion.covariance_intersection import (
     CovarianceIntersectionSettings,
 )
 from eidrive_scenario.fusion.method import Report
+from eidrive_scenario.fusion.prediction import REPORT_LIFETIME
 from eidrive_scenario.v2x.messages.message import StationState
 
 Make = Callable[..., Report]
@@ -66,6 +67,38 @@ def test_fuse_keeps_distant_cars_separate(report: Make, fuse: Fuse) -> None:
     places = [(10.0, 0.0), (10.0, 3.0), (30.0, 0.0)]
     fused = fuse([report("A", 0.0, places), report("B", 0.0, places[:2])], 0.0)
     np.testing.assert_allclose(sorted(fused.boxes[:, :2].tolist()), sorted(places), atol=1e-9)
+
+
+def tracked(held: Report, variance: float) -> Report:
+    """Return the report with the existence and the variance of the velocity [m²/s²] that a tracker states."""
+    detections = replace(held.detections, existence=np.array([0.9]), velocity_variance=np.array([variance]))
+    return replace(held, detections=detections)
+
+
+def test_fuse_covariance_contains_the_stated_variance_of_the_velocity(report: Make, fuse: Fuse) -> None:
+    """As above with P_v = 16: (0.04 + 16 · 0.09 + 6 · 0.009) m². Values below 0.5² m²/s² count as this."""
+    for stated, variance in ((16.0, 16.0), (0.01, 0.25)):
+        given = tracked(report("A", 0.0, [(0.0, 0.0)], velocity=(0.0, 0.0), tracks=(1,)), stated)
+        expected = 0.04 + 0.09 * variance + 6.0 * 0.009
+        np.testing.assert_allclose(fuse([given], 0.3).covariance[0], expected * np.eye(2), rtol=1e-9)
+
+
+def test_fuse_prefers_the_velocity_of_a_settled_track(report: Make, fuse: Fuse) -> None:
+    """A station that has just detected a car at 15 m/s states a velocity of 0 with a deviation of 10 m/s."""
+    new = tracked(report("A", 0.0, [(0.0, 0.0)], velocity=(0.0, 0.0), tracks=(1,)), 100.0)
+    settled = tracked(report("B", 0.0, [(0.0, 0.1)], velocity=(15.0, 0.0), tracks=(1,)), 0.25)
+    fused = fuse([new, settled], 0.0)
+    assert len(fused) == 1
+    np.testing.assert_allclose(fused.velocity, [[15.0, 0.0]], atol=0.5)
+
+
+@pytest.mark.parametrize(("variance", "lifetime"), [(0.0, REPORT_LIFETIME), (16.0, 1.168), (144.0, 0.415)])
+def test_tracks_of_uncertain_velocity_end_early(
+    variance: float, lifetime: float, report: Make, fuse: Fuse
+) -> None:
+    """5 m in 2.28 s for a known velocity. v² t² + 2 t³ = 25 m² has the roots 1.168 s and 0.415 s for 4 and 12 m/s."""
+    given = tracked(report("A", 0.0, [(0.0, 0.0)], velocity=(0.0, 0.0), tracks=(1,), complete=False), variance)
+    assert [len(fuse([given], lifetime + late)) for late in (-0.01, 0.01)] == [1, 0]
 
 
 @pytest.mark.parametrize("observed", [False, True])

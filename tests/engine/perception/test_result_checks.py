@@ -76,6 +76,8 @@ def test_check_detections_accepts_finite_numbers(found: Detections) -> None:
         (lambda: detections(velocity=np.array([[math.nan, 1e300]])), "returned velocity with the value 1e+300"),
         (lambda: detections(covariance=-np.ones((1, 2, 2))), "returned a variance with the value -1"),
         (lambda: detections(covariance=np.full((1, 2, 2), 1e300)), "returned covariance with the value 1e+300"),
+        (lambda: detections(velocity_variance=np.array([-1.0])), "returned velocity_variance with the value -1"),
+        (lambda: detections(velocity_variance=np.array([math.nan])), "returned velocity_variance with the value nan"),
         (lambda: detections(time=None), "returned time as None"),
         (lambda: detections(time=math.nan), "returned time with the value nan"),
         (lambda: detections(time="1"), "returned time as an object of type str"),

@@ -421,6 +421,24 @@ def test_velocity_of_new_track_is_zero_until_it_is_known() -> None:
     assert held.velocity[0, 0] == pytest.approx(15.0, abs=1.0)
 
 
+@pytest.mark.parametrize("kind", ["cv", "ctrv"])
+def test_variance_of_velocity_covers_the_error_of_a_new_track(kind: str) -> None:
+    """A car at 10 m/s is reported at rest while boxes with errors of 0.5 m do not prove its motion: its velocity is
+    within three standard deviations. One at rest is known to 0.5 m/s after three seconds."""
+    track, suppressed = tracker(kind), 0
+    for scan in range(6):
+        found = track.update(cars(DT * scan, (scan * 1.0, 0.0), deviation=0.5))
+        for velocity, variance in zip(found.velocity, found.velocity_variance, strict=True):
+            error = math.dist(velocity, (10.0, 0.0))
+            assert error < 3.0 * math.sqrt(variance)
+            suppressed += error > 9.0
+    assert suppressed
+    track = tracker(kind)
+    for scan in range(30):
+        found = track.update(cars(DT * scan, (0.0, 0.0), deviation=0.5))
+    assert found.velocity_variance[0] < 0.25
+
+
 @pytest.mark.parametrize("yaw", [0.0, math.pi / 2.0])
 def test_new_vehicle_moves_across_its_axis_only_if_that_is_certain(yaw: float) -> None:
     """Successive boxes differ by -0.75 m in x and, by an error of one deviation, 0.2 m in y within 0.05 s: 15 and 4
