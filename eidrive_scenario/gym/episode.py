@@ -10,10 +10,11 @@ import msgspec
 from eidrive_scenario.driving.stack import DrivingStack, StackContext, StackFactory
 from eidrive_scenario.driving.stations import Stations
 from eidrive_scenario.driving.step import AgentStep, StationAction, StationPerception
-from eidrive_scenario.errors import NOT_JUDGED
+from eidrive_scenario.errors import NOT_JUDGED, PASSED
 from eidrive_scenario.openscenario import ConcreteRun, Scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import RunResult, RunSettings, Simulation
+from eidrive_scenario.simulation.run_outcome import exit_code_of
 from eidrive_scenario.simulation.scenario_options import select_planner
 from eidrive_scenario.simulation.tick import TickStart
 from eidrive_scenario.world.view import WorldView
@@ -34,7 +35,7 @@ class Episode:
     """One run of a scenario. It is closed when it ends, or by `close`.
 
     planners       planners of stations that replace those of the scenario, by station
-    colliding      stations whose first contact ends the run, as a failure of the criterion `collision`
+    colliding      stations whose first contact ends the run, by an added criterion `collision` that does not judge it
     """
 
     def __init__(
@@ -56,6 +57,7 @@ class Episode:
             stack=stations_with_planners(planners),
             load_weights=load_weights,
         )
+        self._added = frozenset(criterion.name for criterion in self.simulation.criteria[-len(added) :] if added)
         self.result: RunResult | None = None
         """Result of the run; None before its end."""
         self.last_frame: Frame | None = None
@@ -97,14 +99,19 @@ class Episode:
                 if end is None:
                     self.start = self.simulation.begin_tick()
         if end is not None:
-            result = self.simulation.result()
-            # Criteria that the episode adds end it, and do not judge it.
-            is_judged = len(result.criteria) > len(self._colliding) or self.simulation.settings.no_criteria
-            self.result = result if is_judged else replace(result, passed=False, exit_code=NOT_JUDGED)
+            self.result = self._judge(self.simulation.result())
             self.simulation.close()
         for observe in self.observers:
             observe(self)
         return Transition(before, self.start.view, steps)
+
+    def _judge(self, result: RunResult) -> RunResult:
+        """Return the result with the outcome by criteria of scenario and settings: those of the episode only end it."""
+        no_criteria = self.simulation.settings.no_criteria
+        verdicts = [verdict for verdict in result.criteria if verdict.name not in self._added]
+        is_judged = bool(verdicts) or no_criteria
+        exit_code = exit_code_of(verdicts, result.end_reason, no_criteria=no_criteria) if is_judged else NOT_JUDGED
+        return replace(result, passed=exit_code == PASSED, exit_code=exit_code)
 
     def _tick(self, decide: Decide) -> tuple[Mapping[str, AgentStep], str | None]:
         for name, action in decide(self.start.perceived).items():

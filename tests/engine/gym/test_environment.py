@@ -11,9 +11,9 @@ import numpy as np
 import pybullet
 import pytest
 from gymnasium.utils.env_checker import check_env
-from lone_car import lone_car
+from lone_car import car_behind_parked_car, lone_car
 
-from eidrive_scenario.errors import NOT_JUDGED, InputError, SettingError, SimulationError
+from eidrive_scenario.errors import FAILED, NOT_JUDGED, PASSED, InputError, SettingError, SimulationError
 from eidrive_scenario.gym import ENVIRONMENT_ID, EidriveEnv
 from eidrive_scenario.simulation import RunResult, RunSettings, run_file
 
@@ -231,6 +231,17 @@ def test_episode_with_own_criterion_passes() -> None:
     env = EidriveEnv(lone_car(0.5), settings=RunSettings(criteria={"time_limit": {"within": 60}}))
     *_, info = play(env, [0.0], seed=1)
     assert (info["passed"], info["reward_terms"]["passed"]) == (True, 5.0)
+
+
+@pytest.mark.parametrize(("at_least", "passed"), [(5, True), (50, False)])
+def test_added_collision_criterion_ends_the_episode_without_judging_it(at_least: int, passed: bool) -> None:
+    criteria = {"driven_distance": {"of": "Ego", "at_least": at_least}}
+    env = EidriveEnv(car_behind_parked_car(), settings=RunSettings(criteria=criteria))
+    *_, info = play(env, [0.5], seed=1)
+    assert info["end_reason"] == "criterion: collision"
+    assert info["criteria"] == {"driven_distance": passed, "collision": False}
+    assert (info["passed"], info["reward_terms"]["passed"]) == (passed, 5.0 * passed)
+    assert info["result"].exit_code == (PASSED if passed else FAILED)
 
 
 @pytest.mark.parametrize("name", ["colision", "no such"])
