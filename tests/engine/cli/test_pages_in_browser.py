@@ -624,6 +624,19 @@ def test_columns_and_filters_of_report_are_in_its_address(browser: Any, runs_pag
     assert runs_page.count() < 30
 
 
+def test_long_column_title_of_report_breaks_between_its_parts(runs_page: ReportPage) -> None:
+    page = runs_page.page
+    page.locator("#columns summary").click()
+    page.get_by_role("checkbox", name="stations.Ego.range").check()
+    lines = """([...parts]) => parts.filter((part) => part.nodeType === Node.TEXT_NODE).map((part) => {
+        const range = document.createRange();
+        range.selectNode(part);
+        return new Set([...range.getClientRects()].map(({ top }) => top)).size;
+    })"""
+    button = page.get_by_role("columnheader", name="stations.Ego.range").get_by_role("button")
+    assert button.evaluate(f"(node) => ({lines})(node.childNodes)") == [1, 1, 1]
+
+
 @pytest.mark.parametrize("size", WIDTHS)
 def test_report_of_ten_thousand_runs_has_few_rows_and_reaches_all(browser: Any, tmp_path: Path, size: str) -> None:
     """Heights of rows differ; scrolling to the end and back neither skips nor repeats a run."""

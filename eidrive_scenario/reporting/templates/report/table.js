@@ -23,6 +23,11 @@ function widthOf(column) {
   return 22 + 8.2 * Math.min(letters, 24);
 }
 
+/* Return a title that breaks between its parts, such as those of channel.delay.seconds, before it breaks within one. */
+function breakable(title) {
+  return title.split(/(?<=[._])|(?<=[a-z])(?=[A-Z])/).flatMap((part, i) => (i ? [make("wbr"), part] : [part]));
+}
+
 /* Return what a cell shows. */
 function cellContent(column, run) {
   if (column.title === FIRST_SORT && column.part === "Run") return [openButton(run)];
@@ -163,7 +168,7 @@ function showColumns(shown, sort) {
   grid.querySelector("colgroup").replaceChildren(...shown.map((column) => make("col", { style: column.title === "reason" ? "" : `width:${widthOf(column)}px` })));
   grid.style.setProperty("--least", `${total}px`);
   const heads = shown.map((column) => {
-    const button = make("button", { type: "button" }, column.title);
+    const button = make("button", { type: "button" }, ...breakable(column.title));
     button.addEventListener("click", () => sort(column));
     return make("th", { scope: "col", role: "columnheader", class: column.number && column.title !== FIRST_SORT ? "number" : "word" }, button);
   });
