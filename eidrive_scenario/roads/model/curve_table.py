@@ -8,14 +8,14 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.roads.model.curves import STANDSTILL, Cubic, Curve, ReferenceLine, Spiral, fresnel
-from eidrive_scenario.roads.model.polynomials import spread
+from eidrive_scenario.roads.model.polynomials import piece_borders, spread
 
 EPSILON = float(np.finfo(np.float64).eps)
 """Argument of the cardinal sine in place of 0, as in numpy.sinc."""
 
 
 class CurveTable:
-    """Reference lines of many roads for joint evaluation: line i covers [base[i], base[i] + length + 1)."""
+    """Reference lines of many roads for joint evaluation: line i begins at base[i] of a common axis."""
 
     def __init__(self, lines: Sequence[ReferenceLine]) -> None:
         self.base: Array = spread([line.length for line in lines])
@@ -24,8 +24,7 @@ class CurveTable:
         curves = [curve for group in reached for curve in group]
         owner = np.repeat(np.arange(len(lines)), [len(group) for group in reached])
         self._starts = np.array([curve.s for curve in curves])
-        first = np.diff(owner, prepend=-1) > 0
-        self._borders = (self.base[owner] + np.where(first, 0.0, np.maximum(self._starts, 0.0)))[1:]
+        self._borders = piece_borders(self.base, owner, self._starts)
         """Starts of all curves but the first one, on the common axis of all lines."""
         x, y, h = (np.array([getattr(curve, name) for curve in curves]) for name in ("x", "y", "h"))
         self._kind = np.array([_kind(curve) for curve in curves], dtype=np.int8)

@@ -14,6 +14,8 @@ Piece = tuple[float, float, float, float, float]
 """Start s of a piece and its coefficients a, b, c, d; ds counts from that start."""
 ROUNDING = 1e-6
 """Maximum difference of two starts that is attributed to rounding [m]."""
+GAP = 1.0
+"""Distance between two functions on a common axis [m]. Half of it belongs to each, as s may be beyond both ends."""
 
 
 class Polynomials:
@@ -88,8 +90,8 @@ def combine(terms: Sequence[tuple[float, Polynomials]]) -> Polynomials:
 class PolynomialTable:
     """Functions with individual ranges of s for joint evaluation.
 
-    Function i occupies the interval [base[i], base[i] + span[i] + 1) of a common axis. One binary search thus finds the
-    pieces of any mixture of functions.
+    Function i occupies the interval from base[i] to base[i] + span[i], and half of GAP on both sides, of a common axis.
+    One binary search thus finds the pieces of any mixture of functions.
     """
 
     def __init__(self, functions: Sequence[Polynomials], spans: Sequence[float]) -> None:
@@ -102,7 +104,7 @@ class PolynomialTable:
         owner = np.repeat(np.arange(len(functions)), counts)
         reached = pieces[:, 0] <= limit
         pieces, owner = pieces[reached], owner[reached]
-        self._borders = (self.base[owner] + np.maximum(pieces[:, 0], 0.0))[1:]
+        self._borders = piece_borders(self.base, owner, pieces[:, 0])
         """Starts of all pieces but the first one, on the common axis."""
         self._pieces = pieces
         """Start and coefficients a, b, c, d of each piece."""
@@ -149,5 +151,15 @@ class PolynomialTable:
 
 
 def spread(spans: Sequence[float]) -> Array:
-    """Return the starts of intervals with the given lengths on a common axis, one meter apart."""
-    return np.fromiter(accumulate((span + 1.0 for span in spans), initial=0.0), dtype=np.float64)[:-1]
+    """Return the starts of intervals with the given lengths on a common axis, GAP apart."""
+    return np.fromiter(accumulate((span + GAP for span in spans), initial=0.0), dtype=np.float64)[:-1]
+
+
+def piece_borders(base: Array, owner: Integers, starts: Array) -> Array:
+    """Return the starts of all pieces but the first one on the axis of `base`.
+
+    owner   function of each piece (P,), in ascending order
+    starts  start of each piece in its function (P,) [m]; the first piece begins half of GAP before its function
+    """
+    is_first = np.diff(owner, prepend=-1) > 0
+    return np.asarray((base[owner] + np.where(is_first, -0.5 * GAP, np.maximum(starts, -0.5 * GAP)))[1:])

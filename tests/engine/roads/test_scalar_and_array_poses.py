@@ -62,8 +62,8 @@ def network(draw: np.random.Generator) -> RoadNetwork:
     return RoadNetwork.parse(map_xml(*(random_road(draw, number) for number in range(ROADS))))
 
 
-def test_poses_of_points_and_arrays_agree_on_random_roads(network: RoadNetwork, draw: np.random.Generator) -> None:
-    s, offset = draw.uniform(0.0, LENGTH, 25), draw.uniform(-2.0, 2.0, 25)
+def compare_poses(network: RoadNetwork, s: np.ndarray, offset: np.ndarray) -> list[float]:
+    """Assert that poses of points and of arrays are equal on all lanes, and return the roll of each."""
     rolls = []
     for number in network.roads:
         for lane in (1, 0, -1, -2):
@@ -74,7 +74,18 @@ def test_poses_of_points_and_arrays_agree_on_random_roads(network: RoadNetwork, 
         many = np.column_stack(network.road_pose(number, s, offset))
         single = [network.road_pose_at(number, float(a), float(b)) for a, b in zip(s, offset, strict=True)]
         assert many == pytest.approx(np.array(single), abs=1e-11, rel=0.0), number
+    return rolls
+
+
+def test_poses_of_points_and_arrays_agree_on_random_roads(network: RoadNetwork, draw: np.random.Generator) -> None:
+    s, offset = draw.uniform(0.0, LENGTH, 25), draw.uniform(-2.0, 2.0, 25)
+    rolls = compare_poses(network, s, offset)
     assert np.ptp(rolls) > 1.0  # The roads are banked to both sides.
+
+
+@pytest.mark.parametrize("s", [-0.1, -0.01, LENGTH + 0.01, LENGTH + 0.1])
+def test_poses_of_points_and_arrays_agree_just_beyond_roads(network: RoadNetwork, s: float) -> None:
+    compare_poses(network, np.full(3, s), np.array([-2.0, 0.0, 2.0]))
 
 
 @pytest.mark.parametrize("number", range(16))
