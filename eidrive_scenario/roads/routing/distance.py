@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Mapping
-from typing import Literal
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Literal, NamedTuple
 
 from eidrive_scenario.roads.geometry import poses
 from eidrive_scenario.roads.model.location import LaneKey, LaneLocation
@@ -17,14 +18,14 @@ Chain = Literal["shortest", "fastest", "leastIntersections"]
 
 
 class RoadDistances:
-    """Shortest chains of roads along reference lines by Dijkstra's algorithm, cached per road and direction."""
+    """Shortest chains of roads along reference lines; their search is kept per road and direction."""
 
     def __init__(self, roads: Mapping[str, Road], links: LaneLinks, speed: Callable[[str], float]) -> None:
         """Store the roads. `speed` returns the assumed speed of a road for the fastest chain [m/s]."""
         self._roads = roads
         self._links = links
         self._speed = speed
-        self._reached: dict[tuple[str, int, Chain], dict[str, tuple[float, float, int]]] = {}
+        self._searches: dict[tuple[str, int, Chain], _Search] = {}
 
     def between(
         self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest", only: int = 0
@@ -53,15 +54,18 @@ class RoadDistances:
                 return ahead, left_of_a, 1
             if only in (0, sense):
                 options.append((abs(ahead) * self._per_meter(a.road, by), abs(ahead), sense, left_of_a, 1))
+        rest = {1: b.s, -1: self._roads[b.road].length - b.s}
+        rest_costs = {entered: meters * self._per_meter(b.road, by) for entered, meters in rest.items()}
         for sense in (only,) if only else (1, -1):
-            way = self._from(a.road, direction * sense, by).get(b.road)
-            if way is not None:
-                cost, gap, entered = way
-                rest = b.s if entered > 0 else self._roads[b.road].length - b.s
-                left = self._roads[a.road].length - a.s if direction * sense > 0 else a.s
+            left = self._roads[a.road].length - a.s if direction * sense > 0 else a.s
+            left_cost = left * self._per_meter(a.road, by)
+            least = min((option[0] for option in options), default=math.inf)
+            entry = self._search(a.road, direction * sense, by).best_entry(b.road, rest_costs, least - left_cost)
+            if entry is not None:
+                cost, gap, entered = entry
                 across = b.t * entered * sense - a.t * direction
-                cost += left * self._per_meter(a.road, by) + rest * self._per_meter(b.road, by)
-                options.append((cost, left + gap + rest, sense, across, entered * direction * sense))
+                cost += left_cost + rest_costs[entered]
+                options.append((cost, left + gap + rest[entered], sense, across, entered * direction * sense))
         if not options:
             return None
         _, span, sense, across, same = min(options, key=lambda option: option[0])
@@ -75,12 +79,14 @@ class RoadDistances:
         enters = junction is not None and junction != self._roads[before].junction_id
         return JUNCTION_COST if by == "leastIntersections" and enters else 0.0
 
-    def _from(self, road: str, direction: int, by: Chain) -> dict[str, tuple[float, float, int]]:
-        """Return cost, length between [m] and direction of entry of each road reached from `road` in `direction`."""
-        cached = self._reached.get((road, direction, by))
-        if cached is not None:
-            return cached
-        reached: dict[str, tuple[float, float, int]] = {}
+    def _search(self, road: str, direction: int, by: Chain) -> _Search:
+        search = self._searches.get((road, direction, by))
+        if search is None:
+            search = self._searches[road, direction, by] = _Search(self._from(road, direction, by))
+        return search
+
+    def _from(self, road: str, direction: int, by: Chain) -> Iterator[tuple[str, _Entry]]:
+        """Yield the entries of roads from `road` in `direction` in the order of their costs (Dijkstra's algorithm)."""
         done: set[tuple[str, int]] = set()
         first = self._links.beyond_road(road, direction)
         queue = [(self._entering(road, number, by), 0.0, number, way) for number, way in first]
@@ -90,14 +96,50 @@ class RoadDistances:
             if (number, way) in done:
                 continue
             done.add((number, way))
-            reached.setdefault(number, (cost, gap, way))
+            yield number, _Entry(cost, gap, way)
             length = self._roads[number].length
             cost += length * self._per_meter(number, by)
             for other, onward in self._links.beyond_road(number, way):
                 if (other, onward) not in done:
                     heapq.heappush(queue, (cost + self._entering(number, other, by), gap + length, other, onward))
-        self._reached[road, direction, by] = reached
-        return reached
+
+
+class _Entry(NamedTuple):
+    """Entry of a road: its cost, the length of the roads before it [m], and its direction, +1 along s, else -1."""
+
+    cost: float
+    gap: float
+    direction: int
+
+
+class _Search:
+    """Search for roads, continued as far as the requests need; `entries` yields them in the order of their costs."""
+
+    def __init__(self, entries: Iterator[tuple[str, _Entry]]) -> None:
+        self._entries = entries
+        self._reached: dict[str, list[_Entry]] = {}
+        self._cost = 0.0
+        """Cost of the last entry; no later one costs less."""
+
+    def best_entry(self, road: str, rest: Mapping[int, float], limit: float) -> _Entry | None:
+        """Return the entry of a road that leads to a location on it at the least cost; None without one below `limit`.
+
+        A road can be entered at both ends.
+
+        rest  costs on the road up to the location, by the direction of entry
+        """
+        reached = self._reached.setdefault(road, [])
+        limit = min(limit, *(entry.cost + rest[entry.direction] for entry in reached), math.inf)
+        while self._cost < limit:
+            number, entry = next(self._entries, ("", None))
+            if entry is None:
+                self._cost = math.inf
+                break
+            self._cost = entry.cost
+            self._reached.setdefault(number, []).append(entry)
+            if number == road:
+                limit = min(limit, entry.cost + rest[entry.direction])
+        return min(reached, key=lambda entry: entry.cost + rest[entry.direction], default=None)
 
 
 def locate_near(

@@ -1,7 +1,7 @@
 """Tests of motion along lanes, through links and junctions."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import pytest
@@ -300,3 +300,47 @@ def test_distance_along_connected_roads() -> None:
 def test_distance_between_unconnected_roads_is_none() -> None:
     network = RoadNetwork.parse(map_xml(road_xml("a"), road_xml("b", y=50.0)))
     assert network.distance(network.location("a", -1, 1.0), network.location("b", -1, 1.0)) is None
+
+
+@pytest.mark.parametrize(
+    ("s", "expected", "orientation"), [(10.0, 70.0, 1), (127.0, 187.0, 1), (128.0, 187.0, -1), (190.0, 125.0, -1)]
+)
+def test_distance_enters_a_road_at_the_nearer_end(s: float, expected: float, orientation: int) -> None:
+    """From the last 50 m of road a, 10 m lead to the start and 65 m to the end of road b of 200 m."""
+    turns = {"start": 10.0, "end": 65.0}
+    roads = [
+        road_xml(end, length=length, x=100.0, junction="9", link=predecessor_xml("a") + successor_xml("b", end))
+        for end, length in turns.items()
+    ]
+    both_ends = predecessor_xml(junction="9") + successor_xml(junction="9")
+    network = RoadNetwork.parse(
+        map_xml(
+            road_xml("a", link=successor_xml(junction="9")),
+            road_xml("b", length=200.0, x=110.0, link=both_ends),
+            *roads,
+            rest=junction_xml("9", "a", {"start": -1, "end": -1}),
+        )
+    )
+    a, b = network.location("a", -1, 50.0), network.location("b", -1, s)
+    ahead = network.distance(a, b)
+    assert ahead is not None
+    assert ahead[0] == pytest.approx(expected)
+    assert network.orientation(a, b) == orientation
+
+
+def test_distance_between_neighboring_roads_searches_no_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A row of 100 roads: from 1 m before the end of road 50 to 1 m after the start of the next one."""
+    links = [successor_xml("1"), *(predecessor_xml(f"{n - 1}") + successor_xml(f"{n + 1}") for n in range(1, 99))]
+    row = [road_xml(f"{n}", x=100.0 * n, link=link) for n, link in enumerate(links)]
+    network = RoadNetwork.parse(map_xml(*row, road_xml("99", x=9900.0, link=predecessor_xml("98"))))
+    visited: list[str] = []
+    beyond_road = network.links.beyond_road
+
+    def counted(road: str, direction: int) -> Iterator[tuple[str, int]]:
+        visited.append(road)
+        return beyond_road(road, direction)
+
+    monkeypatch.setattr(network.links, "beyond_road", counted)
+    distance = network.distance(network.location("50", -1, 99.0), network.location("51", -1, 1.0))
+    assert distance == pytest.approx((2.0, 0.0))
+    assert len(visited) <= 4
