@@ -105,7 +105,10 @@ def _repeated(network: RoadNetwork, road_object: RoadObject) -> Iterator[PlacedO
             ds = (i + 0.5) * part if gapless else i * part
             share = ds / repeat.length if repeat.length > 0.0 else 0.0
             ends = repeat.width, repeat.height, repeat.size, repeat.radius
-            width, height, length, radius = (a + (b - a) * share for a, b in ends)
+            sizes = [a + (b - a) * share for a, b in ends]
+            if any(size <= 0.0 < max(pair) for size, pair in zip(sizes, ends, strict=True)):
+                continue  # It tapers to nothing there.
+            width, height, length, radius = sizes
             length, width = 2.0 * radius or length or road_object.length, 2.0 * radius or width or road_object.width
             pose = _pose_in_repetition(network, road_object, repeat, ds)
             shift = repeat.s + ds - road_object.s, repeat.t[0] + (repeat.t[1] - repeat.t[0]) * share - road_object.t

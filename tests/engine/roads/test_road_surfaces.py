@@ -170,6 +170,19 @@ def test_repeated_objects_have_the_size_of_object_or_repetition(size: str, repea
     assert [one.width for one in placed] == pytest.approx(expected if "radius" in size else [2.0, 2.0, 2.0])
 
 
+@pytest.mark.parametrize("size", ["width", "height", "length", "radius"])
+def test_repeated_object_that_grows_from_nothing_starts_without_one(size: str) -> None:
+    """OpenDRIVE 1.8: sizes of the repetition override those of the object, linearly from its start to its end."""
+    objects = (
+        '<objects><object id="1" type="tree" s="0" t="5" length="9" width="9" height="9">'
+        f'<repeat s="10" length="40" distance="20" {size}Start="0" {size}End="2"/></object></objects>'
+    )
+    placed = list(placed_objects(RoadNetwork.parse(map_xml(road_xml(extra=objects)))))
+    assert [one.pose.x for one in placed] == pytest.approx([30.0, 50.0])
+    values = [one.length / 2.0 if size == "radius" else getattr(one, size) for one in placed]
+    assert values == pytest.approx([1.0, 2.0])
+
+
 @pytest.mark.parametrize(("length", "distance"), [(0.6, 0.2), (17.4, 5.8), (40.0, 20.0)])
 def test_last_repetition_at_a_multiple_of_the_distance_is_placed(length: float, distance: float) -> None:
     """In floating point 0.6 / 0.2 and 17.4 / 5.8 are below 3."""
