@@ -18,6 +18,8 @@ from eidrive_scenario.sensing.signals import Kind, signal_kind
 
 ON_PATH = 1.75
 """Maximum distance between a path and the lane center at the stop line of the lane [m]."""
+AS_NEAR = 0.5
+"""Maximum difference of the distances of the end of a path from two connecting roads that may be on any of them [m]."""
 NEAR_SIDE = 10.0
 """Maximum distance of a light from the entry of its junction, along and across, at which it stands before it [m]."""
 SAME_WAY = math.cos(math.radians(45.0))
@@ -27,7 +29,8 @@ class StopLine(NamedTuple):
     """Position at which a signal stops the traffic of one lane.
 
     x, y, z   on the center of the lane [m];  heading  of its traffic [rad]
-    beyond    a point that only the routes with this signal pass; None if the line alone determines them
+    beyond    a point that only the routes with this signal pass, unless they end before it; None if the line alone
+              determines them
     """
 
     signal: str
@@ -146,6 +149,8 @@ def places_along(
     step = np.diff(path, axis=0)
     length = np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)
     start = np.concatenate([[0.0], np.cumsum(length)[:-1]])
+    ending: list[tuple[float, float, StopLine]] = []
+    """Lines at which the path enters the junction in which it ends, with the distance of its end from their ways."""
     for line in lines:
         beyond = [index for index, _ in _passes(path, step, length, *line.beyond)] if line.beyond is not None else []
         passes = [*_passes(path, step, length, line.x, line.y), (len(step), 0.0)]
@@ -153,11 +158,31 @@ def places_along(
             ahead = step[index] / length[index]
             if ahead[0] * math.cos(line.heading) + ahead[1] * math.sin(line.heading) < SAME_WAY:
                 continue
-            if line.beyond is not None and not any(index <= later < end for later in beyond):
-                continue
             if heights is not None and abs(float(heights[index]) - line.z) > OTHER_LEVEL:
                 continue
-            yield float(start[index] + share * length[index]), line
+            distance = float(start[index] + share * length[index])
+            if line.beyond is None or any(index <= later < end for later in beyond):
+                yield distance, line
+            elif end == len(step):
+                ending.append((_distance_at_end(path, line), distance, line))
+    limit = min(ON_PATH, min((aside for aside, _, _ in ending), default=0.0) + AS_NEAR)
+    yield from ((distance, line) for aside, distance, line in ending if aside <= limit)
+
+
+def _distance_at_end(path: Array, line: StopLine) -> float:
+    """Return the distance of the end of a path (M, 2) from the way between a stop line and its point `beyond` [m].
+
+    The way is a parabola along the heading at the line, a bend of up to a quarter turn. The distance is inf at an end
+    that is not between them.
+    """
+    if line.beyond is None:
+        return math.inf
+    cos, sin = math.cos(line.heading), math.sin(line.heading)
+    (ahead, left), (ahead_beyond, left_beyond) = (
+        (cos * (x - line.x) + sin * (y - line.y), cos * (y - line.y) - sin * (x - line.x))
+        for x, y in (path[-1].tolist(), line.beyond)
+    )
+    return abs(left - left_beyond * (ahead / ahead_beyond) ** 2) if 0.0 < ahead <= ahead_beyond else math.inf
 
 
 def _passes(path: Array, step: Array, length: Array, x: float, y: float) -> Iterator[tuple[int, float]]:

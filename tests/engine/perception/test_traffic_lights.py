@@ -107,6 +107,10 @@ def test_stop_lines_of_connecting_roads_apply_before_junction() -> None:
     on = np.column_stack([np.arange(50.0, 110.0), np.full(60, -1.75)])
     assert names(roads, np.concatenate([before, on])) == [("straight", 50.0)]
     assert [name for name, _ in names(roads, np.concatenate([before, turn]))] == ["left"]
+    # A destination on a connecting road before its middle
+    assert [name for name, _ in names(roads, np.concatenate([before, turn[:7]]))] == ["left"]
+    assert names(roads, np.concatenate([before, on[:9]])) == [("straight", 50.0)]
+    assert names(roads, before) == []
 
 
 def test_signals_ahead_require_stop_only_after_sight() -> None:
