@@ -67,8 +67,8 @@ class JunctionRules:
             junction.id: frozenset(junction.priorities) for junction in roads.junctions.values() if junction.priorities
         }
         self._headings_in: dict[str, Array] = {}
-        self._right = 1.0 if all(road.rule == "RHT" for road in roads.roads.values()) else -1.0
-        """Sign of angles, which are exchanged with traffic on the left."""
+        self._left_hand = frozenset(road.junction_id for road in roads.roads.values() if road.rule == "LHT")
+        """Junctions with traffic on the left."""
 
     def stops_along(self, points: Array, heights: Array | None = None) -> tuple[float, ...]:
         """Return the distances along a way (M, 2) at which stop signs hold its traffic [m].
@@ -131,7 +131,7 @@ class JunctionRules:
         The order of precedence: lights, signs, priorities of the map, priority to the right, oncoming traffic before
         left turns. In countries with traffic on the left the sides are exchanged.
         """
-        relation = self._right * float(wrap_angle(other.heading - own.heading))
+        relation = self._right(own) * float(wrap_angle(other.heading - own.heading))
         if own.gives_way != other.gives_way and not own.has_light:
             return own.gives_way
         by_map = None if own.has_light else self._yields_by_map(own, other)
@@ -161,7 +161,12 @@ class JunctionRules:
 
     def _turns_across(self, own: Passage, other: Passage) -> bool:
         """Return whether only the first one of two oncoming passages turns across the other one."""
-        return self._right * own.turn > TURNING >= self._right * other.turn
+        right = self._right(own)
+        return right * own.turn > TURNING >= right * other.turn
+
+    def _right(self, passage: Passage) -> float:
+        """Return the sign of angles, which are exchanged with traffic on the left."""
+        return -1.0 if passage.junction in self._left_hand else 1.0
 
     def _yields_by_map(self, own: Passage, other: Passage) -> bool | None:
         """Return whether a priority of the map holds `own` for `other`; None if the map has none for both."""

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from opendrive_xml import road_xml
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules, Passage
@@ -121,6 +122,18 @@ def test_priorities_of_the_map_hold_unseen_traffic() -> None:
 )
 def test_priority_to_the_right_and_left_turns(own: str, other: str, expected: bool) -> None:
     assert gives_way("four_way_junction", own, other) == expected
+
+
+def test_road_with_left_hand_traffic_elsewhere_does_not_change_right_of_way() -> None:
+    text = (ROADS / "four_way_junction.xodr").read_text()
+    far = road_xml("far", x=5000.0, rule="LHT")
+    mixed = JunctionRules(RoadNetwork.parse(text.replace("</OpenDRIVE>", f"{far}</OpenDRIVE>")))
+    east, north, turn, oncoming = (
+        mixed.passages(way("four_way_junction", *ends.split()))[0]
+        for ends in ("west east", "south north", "west north", "east west")
+    )
+    assert (mixed.gives_way(east, north), mixed.gives_way(north, east)) == (True, False)
+    assert (mixed.gives_way(turn, oncoming), mixed.gives_way(oncoming, turn)) == (True, False)
 
 
 @pytest.mark.parametrize(
