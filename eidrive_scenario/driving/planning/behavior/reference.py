@@ -114,7 +114,7 @@ class ReferenceLine:
         self._columns: Array = np.stack([*self.points.T, *self.tangent.T, self.along, self.heading])
         self._roads = roads
         self._beside: dict[int, LanesBeside] = {}
-        self._location: LaneLocation | None = None
+        self._locations: list[LaneLocation | None] = []
         self._of_direction: dict[int, LanesOfDirection] = {}
 
     @property
@@ -133,9 +133,8 @@ class ReferenceLine:
         roads = self._roads
         if roads is None:
             return limits
-        location = None
-        for index, (x, y) in enumerate(self.points.tolist()):
-            location = roads.locate_at(x, y, location, self._height(index), reach=5.0)
+        for index in range(len(limits)):
+            location = self._location(roads, index)
             if location is not None:
                 limits[index] = roads.usual_speed(location.road, location.s, location.lane)
         return limits
@@ -222,8 +221,7 @@ class ReferenceLine:
         roads = self._roads
         if roads is None:
             return None
-        x, y = self.points[index].tolist()
-        location = self._location = roads.locate_at(x, y, self._location, self._height(index), reach=5.0)
+        location = self._location(roads, index)
         if location is None:
             return None
         road = roads.road(location.road)
@@ -247,6 +245,14 @@ class ReferenceLine:
             )
             lanes.append(_Lane(number, center, half, lane.drivable, with_traffic))
         return _Section(location, section, lanes, order.index(location.lane), road.rule == "LHT")
+
+    def _location(self, roads: RoadNetwork, index: int) -> LaneLocation | None:
+        """Return the lane location of a point. In junctions it continues the lanes of the points before."""
+        while len(self._locations) <= index:
+            number, before = len(self._locations), self._locations[-1] if self._locations else None
+            x, y = self.points[number].tolist()
+            self._locations.append(roads.locate_at(x, y, before, self._height(number), reach=5.0))
+        return self._locations[index]
 
     def _lanes_at(self, index: int) -> LanesBeside:
         there = self._section_at(index)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -100,6 +101,24 @@ class TestLanesOfARoute:
         before, after = route_lanes(line_to(roads, (start.x, start.y), (end.x, end.y)))
         assert before.offsets[100:] == pytest.approx(-WIDTH, abs=0.05)
         assert after.offsets[100:] == pytest.approx(0.0, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "start", "end"),
+    [
+        ("four_way_junction", (-20.0, 0.0), (43.8, 60.0)),
+        ("t_junction", (29.8, 60.0), (-20.0, 4.0)),
+        ("roundabout", (-20.0, 0.0), (52.3, -72.3)),
+    ],
+)
+def test_lanes_in_junctions_are_independent_of_the_order_of_requests(
+    name: str, start: tuple[float, float], end: tuple[float, float]
+) -> None:
+    roads = RoadNetwork.load(Path(__file__).parents[4] / "xosc" / "roads" / f"{name}.xodr")
+    first, second = (line_to(roads, start, end) for _ in range(2))
+    forwards = [first.lanes_beside(s) for s in first.along.tolist()]
+    backwards = [second.lanes_beside(s) for s in second.along.tolist()[::-1]]
+    assert [repr(lanes) for lanes in forwards] == [repr(lanes) for lanes in backwards[::-1]]
 
 
 @pytest.mark.parametrize("speed", [5.0, 14.0, 30.0])
