@@ -67,7 +67,8 @@ class Route:
     """Route from `start` to `end` over `lanes`; distances along it count from the start [m].
 
     A closed route ends at its start and is repeated. `lap` is the closed route that follows this one. With
-    `against_traffic` it leads against the driving direction of its lanes.
+    `against_traffic` it leads against the driving direction of its lanes. A route through intermediate locations
+    consists of `parts`.
     """
 
     tables: RoadTables = field(repr=False)
@@ -77,6 +78,7 @@ class Route:
     closed: bool = False
     lap: Route | None = field(default=None, repr=False)
     against_traffic: bool = False
+    parts: tuple[Route, ...] = field(default=(), repr=False)
 
     @property
     def roads(self) -> Mapping[str, Road]:
@@ -90,7 +92,9 @@ class Route:
 
     @cached_property
     def legs(self) -> tuple[Leg, ...]:
-        """Parts of the route, one for each lane section."""
+        """Parts of the route: one for each lane section, or two around an intermediate location near a lane change."""
+        if self.parts:
+            return _join_legs([part.legs for part in self.parts])
         groups: list[list[LaneKey]] = []
         for key in self.lanes:
             if groups and groups[-1][-1][:2] == key[:2] and groups[-1][-1] != key:
@@ -321,6 +325,21 @@ class Route:
         return points, along, owner.astype(np.float64), s
 
 
+def _join_legs(groups: Sequence[Sequence[Leg]]) -> tuple[Leg, ...]:
+    """Return the legs of consecutive routes. Where one ends and the next one begins, both legs become one if no lane is
+    changed, or if one is too short for its lane change, which then begins or ends beyond the intermediate location."""
+    legs = list(groups[0])
+    for first, *others in groups[1:]:
+        last = legs[-1]
+        changes = [leg for leg in (last, first) if leg.lane != leg.lane_end]
+        if not changes or any(abs(leg.s_end - leg.s) < LANE_CHANGE_LENGTH for leg in changes):
+            legs[-1] = Leg(last.road, last.section, last.lane, first.lane_end, last.s, first.s_end)
+        else:
+            legs.append(first)
+        legs += others
+    return tuple(legs)
+
+
 Share = TypeVar("Share", float, Array)
 
 
@@ -335,4 +354,5 @@ def concatenate_routes(routes: Sequence[Route]) -> Route:
     for route in routes[1:]:
         lanes.extend(route.lanes[1:] if route.lanes[0] == lanes[-1] else route.lanes)
     first = routes[0]
-    return Route(first.tables, tuple(lanes), first.start, routes[-1].end, against_traffic=first.against_traffic)
+    end, against_traffic = routes[-1].end, first.against_traffic
+    return Route(first.tables, tuple(lanes), first.start, end, against_traffic=against_traffic, parts=tuple(routes))

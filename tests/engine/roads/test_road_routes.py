@@ -1,6 +1,7 @@
 """Tests of routes over the lane graph."""
 
 import math
+from itertools import pairwise
 from pathlib import Path
 
 import networkx as nx
@@ -10,6 +11,7 @@ from opendrive_xml import (
     junction_xml,
     lane_links_xml,
     lane_xml,
+    lanes_xml,
     map_xml,
     predecessor_xml,
     ring_xml,
@@ -171,6 +173,35 @@ def test_route_passes_intermediate_locations() -> None:
     round_ = network.route(a, b, via=[network.location("b", -1, 50.0)])
     assert once.length == pytest.approx(50.0 * 52.0 / 50.0, rel=1e-3)
     assert round_.length == pytest.approx(once.length + 2 * math.pi * 52.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(
+    ("places", "changes"),
+    [
+        ([(1, 10.0), (2, 150.0), (1, 380.0)], [(10.0, 50.0), (150.0, 190.0)]),
+        ([(1, 10.0), (1, 200.0), (2, 380.0)], [(200.0, 240.0)]),
+        ([(1, 10.0), (2, 150.0), (2, 380.0)], [(10.0, 50.0)]),
+        ([(1, 10.0), (2, 30.0), (2, 380.0)], [(10.0, 50.0)]),  # No lane change within 20 m
+        ([(1, 10.0), (2, 10.0), (2, 380.0)], [(10.0, 50.0)]),
+    ],
+)
+def test_route_is_in_the_lanes_of_intermediate_locations(
+    side: int, places: list[tuple[int, float]], changes: list[tuple[float, float]]
+) -> None:
+    """A lane change is 40 m long and begins at the start or at a waypoint."""
+    roads = RoadNetwork.parse(map_xml(road_xml(length=400.0, lanes=lanes_xml(2, 2))))
+    start, *via, end = (roads.location("1", side * n, s if side < 0 else 400.0 - s) for n, s in places)
+    route = roads.route(start, end, via)
+    ends = [10.0, *(s for change in changes for s in change), 380.0]
+    lane, centers = places[0][0], []
+    for number, (first, last) in enumerate(pairwise(ends)):
+        if number % 2 == 0:
+            centers += [(s, lane) for s in np.linspace(first + 1.0, last, 5).tolist() if last > first]
+            lane = 3 - lane
+    on_path = [route.location_at(s - 10.0) for s, _ in centers]
+    assert [place.t for place in on_path] == pytest.approx([side * (3.5 * n - 1.75) for _, n in centers], abs=1e-6)
+    assert route.length == pytest.approx(370.0, abs=0.25 * len(changes))
 
 
 def test_locations_along_a_route(crossing: RoadNetwork) -> None:
