@@ -85,7 +85,9 @@ def build_ways(tables: RoadTables, links: LaneLinks) -> LaneWays:
                 successors[key][other] = {"weight": data["length"], "kind": "successor"}
     for road in tables.roads:
         for section in road.sections:
-            middle, lanes = 0.5 * section.length, {number: lane for number, lane in section.lanes.items() if number}
+            middle = 0.5 * section.length
+            # A lane without a width separates no others.
+            lanes = {n: lane for n, lane in section.lanes.items() if n and not lane.width.is_zero}
             wide = {n: lane.drivable and lane.width.value(middle) >= MIN_CHANGE_WIDTH for n, lane in lanes.items()}
             for lane, neighbor in pairwise(lanes):  # also across lane 0
                 if wide[lane] and wide[neighbor] and road.directions[lane] == road.directions[neighbor]:

@@ -56,6 +56,14 @@ def test_route_of_a_left_turn_has_continuous_heading(crossing: RoadNetwork) -> N
     assert np.linalg.norm(steps, axis=1).sum() == pytest.approx(route.length, rel=1e-3)
 
 
+@pytest.mark.parametrize("kind", ["none", "driving"])
+def test_route_changes_lanes_over_a_lane_without_width(kind: str) -> None:
+    right = lane_xml(-1) + lane_xml(-2, 0, kind=kind) + lane_xml(-3)
+    roads = RoadNetwork.parse(map_xml(road_xml(length=300.0, lanes=section_xml(right=right))))
+    route = roads.route(roads.location("1", -1, 10.0), roads.location("1", -3, 250.0))
+    assert [key.lane for key in route.lanes] == [-1, -3]
+
+
 def test_route_prefers_lane_change_to_detour() -> None:
     network = ring()
     start, end = network.location("a", -1, 10.0), network.location("b", -2, 10.0)

@@ -231,20 +231,22 @@ class ReferenceLine:
         tx, ty = self.tangent[index].tolist()
         sense = 1 if tx * math.cos(pose.h) + ty * math.sin(pose.h) >= 0.0 else -1
         order = [number for number in section.lanes if number]
-        order = order if sense > 0 else order[::-1]
         if location.lane not in order:
             return None
         lanes = []
-        for number in order:
+        for number in order if sense > 0 else order[::-1]:
             lane = section.lanes[number]
-            center = (lane_t(road, section, lane, location.s)[0] - location.t) * sense
             half = lane.width.value(location.s - section.s) / 2.0
+            if half <= 0.0 and number != location.lane:
+                continue  # It separates no others.
+            center = (lane_t(road, section, lane, location.s)[0] - location.t) * sense
             # On a lane for both directions the vehicle meets traffic unless it is its own.
             with_traffic = roads.driving_direction(road.id, number) == sense and (
                 not lane.is_two_way or number == location.lane
             )
             lanes.append(_Lane(number, center, half, lane.drivable, with_traffic))
-        return _Section(location, section, lanes, order.index(location.lane), road.rule == "LHT")
+        own = next(index for index, lane in enumerate(lanes) if lane.number == location.lane)
+        return _Section(location, section, lanes, own, road.rule == "LHT")
 
     def _location(self, roads: RoadNetwork, index: int) -> LaneLocation | None:
         """Return the lane location of a point. In junctions it continues the lanes of the points before."""

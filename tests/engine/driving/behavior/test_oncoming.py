@@ -256,3 +256,15 @@ def test_lane_for_both_directions_has_oncoming_traffic(kind: str, reverse: bool)
     beside = ReferenceLine(PlannedPath(np.array(line), ends=True), roads).lanes_beside(100.0)
     assert math.isnan(beside.left)
     assert beside.oncoming == pytest.approx(3.5)
+
+
+@pytest.mark.parametrize("kind", ["none", "driving"])
+def test_lane_without_width_separates_no_lanes(kind: str) -> None:
+    """Lanes of 3.5 m on both sides of the vehicle, the left one for oncoming traffic, behind lanes without width."""
+    lanes = section_xml(
+        left=lane_xml(2) + lane_xml(1, 0, kind=kind), right=lane_xml(-1) + lane_xml(-2, 0, kind=kind) + lane_xml(-3)
+    )
+    roads = RoadNetwork.parse(map_xml(road_xml(length=300.0, lanes=lanes)))
+    beside = ReferenceLine(PlannedPath(np.array([(0.0, -1.75), (300.0, -1.75)]), ends=True), roads).lanes_beside(100.0)
+    assert (beside.oncoming, beside.right) == pytest.approx((3.5, -3.5))
+    assert (beside.left_edge, beside.right_edge, beside.far_edge) == pytest.approx((1.75, -5.25, 5.25))
