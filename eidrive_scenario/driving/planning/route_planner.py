@@ -190,10 +190,7 @@ class RoutePlanner(Planner):
         if self.settings.target_speed is not None:
             return self.settings.target_speed
         if self.settings.follow_speed_limit and self.roads is not None:
-            x, y, _ = ego.position.tolist()
-            before = self._location
-            here = _lane_below(self.roads, ego) if before is None else self.roads.locate_at(x, y, before)
-            self._location = here
+            here = self._location = _lane_below(self.roads, ego, self._location)
             usual = USUAL_SPEED if here is None else self.roads.usual_speed(here.road, here.s, here.lane)
             return min(usual, self.spec.max_speed)
         if self._first_speed is None:
@@ -267,9 +264,9 @@ class RoutePlanner(Planner):
         return PlannedPath(ego.position[:2] + reach * np.array([[math.cos(yaw), math.sin(yaw)]]), ends=False)
 
 
-def _lane_below(roads: RoadNetwork, ego: EgoState) -> LaneLocation | None:
+def _lane_below(roads: RoadNetwork, ego: EgoState, hint: LaneLocation | None = None) -> LaneLocation | None:
     x, y, z = ego.position.tolist()
-    return roads.locate_pose(x, y, ego.yaw, z, drivable=True)
+    return roads.locate_pose(x, y, ego.yaw, z, hint, drivable=True)
 
 
 def _lane_at(roads: RoadNetwork, ego: EgoState) -> list[LaneLocation]:

@@ -6,7 +6,16 @@ import math
 
 import numpy as np
 import pytest
-from opendrive_xml import lane_links_xml, lane_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
+from opendrive_xml import (
+    elevation_xml,
+    lane_links_xml,
+    lane_xml,
+    map_xml,
+    predecessor_xml,
+    road_xml,
+    section_xml,
+    successor_xml,
+)
 from scenariogeneration import xodr
 
 from eidrive_scenario.base.detections import Detections
@@ -214,6 +223,17 @@ def test_target_speed_precedence_is_goal_setting_initial_speed(car: ActorSpec) -
     free = planner(car, None)
     assert free.plan(ego(0, 0, speed=4.5), NOTHING, None, 0.0).speeds[0] == 4.5
     assert free.plan(ego(0, 0, speed=2.0), NOTHING, None, 0.0).speeds[0] == 4.5
+
+
+def test_speed_limit_is_that_of_the_level_of_the_vehicle(car: ActorSpec) -> None:
+    """A bridge with a limit of 30 m/s above a road with 10 m/s; the vehicle is teleported from one to the other."""
+    limits = (f'<type s="0" type="town"><speed max="{speed}" unit="m/s"/></type>' for speed in (10, 30))
+    below = road_xml("below", length=500.0, profiles=next(limits))
+    bridge = road_xml("bridge", length=500.0, y=0.3, profiles=next(limits) + elevation_xml(8.0))
+    route = planner(car, RoadNetwork.parse(map_xml(bridge, below)), follow_speed_limit=True)
+    for x, z, expected in ((50.0, 0.0, 10.0), (51.0, 8.0, 30.0), (52.0, 8.0, 30.0), (53.0, 0.0, 10.0)):
+        here = EgoState(0.0, np.array([x, -1.75, z]), 0.0, 0.0, 0.0, 10.0, 0.0, 0.0)
+        assert route.plan(here, NOTHING, None, 0.0).speeds[0] == pytest.approx(expected)
 
 
 def test_straight_path_without_roads_does_not_end(car: ActorSpec) -> None:
