@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -162,25 +161,35 @@ def _merge_parts(scan: Scan, candidates: list[FittedObject]) -> list[FittedObjec
     or that the rays graze so that its points are far apart. The same applies to boxes near each other whose points are
     one cluster.
     """
-    merged = list(candidates)
+    merged = dict(enumerate(candidates))
+    compared = {number: number for number in merged}
+    """Number of the last object with which each object has been compared."""
     again = True
     while again:
         again = False
-        for first, second in combinations(merged, 2):
-            if not overlap(_enlarge(first.fit.box, NEAR), second.fit.box):
-                continue
-            rows = np.concatenate([first.rows, second.rows])
-            if (
-                overlap(_enlarge(first.fit.box, TOUCHING), second.fit.box)
-                or len(clusters(scan.points[rows], scan.pattern.azimuth)) == 1
-            ):
-                fit = scan.fit(rows, tuple(PRIORS))
-                if fit is not None and fit.deviation <= POOR_FIT:
-                    merged = [kept for kept in merged if kept is not first and kept is not second]
-                    merged.append(FittedObject(rows, fit))
-                    again = True
-                    break
-    return merged
+        end = max(merged, default=-1) + 1
+        pairs = ((first, other) for first in merged for other in range(compared[first] + 1, end) if other in merged)
+        for first, other in pairs:
+            compared[first] = other
+            union = _union(scan, merged[first], merged[other])
+            if union is not None:
+                del merged[first], merged[other]
+                merged[end], compared[end] = union, end
+                again = True
+                break
+    return list(merged.values())
+
+
+def _union(scan: Scan, first: FittedObject, second: FittedObject) -> FittedObject | None:
+    """Return one object with the points of two, or None if they are two objects."""
+    if not overlap(_enlarge(first.fit.box, NEAR), second.fit.box):
+        return None
+    rows = np.concatenate([first.rows, second.rows])
+    touches = overlap(_enlarge(first.fit.box, TOUCHING), second.fit.box)
+    if not touches and len(clusters(scan.points[rows], scan.pattern.azimuth)) != 1:
+        return None
+    fit = scan.fit(rows, tuple(PRIORS))
+    return FittedObject(rows, fit) if fit is not None and fit.deviation <= POOR_FIT else None
 
 
 def _enlarge(box: Sequence[float], margin: float) -> Sequence[float]:

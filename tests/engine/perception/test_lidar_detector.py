@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,9 +13,11 @@ from msgspec.structs import replace
 from opendrive_xml import elevation_xml, map_xml, road_xml
 
 from eidrive_scenario.base.detections import Detections
-from eidrive_scenario.base.geometry import iou_bev
+from eidrive_scenario.base.geometry import iou_bev, overlap
 from eidrive_scenario.perception.detector import DetectorContext
 from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame, pattern_from_points, pattern_from_settings
+from eidrive_scenario.perception.lidar import objects
+from eidrive_scenario.perception.lidar.box_fit import Fit
 from eidrive_scenario.perception.lidar.detector import LidarDetector, LidarDetectorSettings
 from eidrive_scenario.perception.oracle import OracleDetector
 from eidrive_scenario.roads import RoadNetwork
@@ -390,3 +394,30 @@ def test_level_frame_to_local_inverts_to_world() -> None:
     turned = frame.covariance_to_world(np.array([[[4.0, 0.0], [0.0, 1.0]]]))
     along = np.array([math.cos(0.7), math.sin(0.7)])
     assert along @ turned[0] @ along == pytest.approx(4.0)
+
+
+def test_pairs_of_objects_are_compared_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 30 cars, 8 are in two parts: with the merged ones 46 objects. The boxes of these parts are compared twice."""
+
+    def box(number: int) -> tuple[float, ...]:
+        column, line = number % 30 % 6, number % 30 // 6
+        return 12.0 * column + (number >= 30), 8.0 * line, 0.75, 3.0 if number >= 30 else 4.0, 1.8, 1.5, 0.0
+
+    def fit(rows: np.ndarray, classes: Sequence[str]) -> Fit:
+        return Fit(box(int(rows[0])), "car", np.eye(2), 0.0)
+
+    comparisons = []
+
+    def counted(first: Sequence[float], second: Sequence[float]) -> bool:
+        comparisons.append((first, second))
+        return overlap(first, second)
+
+    monkeypatch.setattr(objects, "overlap", counted)
+    parts = [objects.FittedObject(np.array([number]), fit(np.array([number]), ())) for number in range(38)]
+    scan: Any = SimpleNamespace(points=np.zeros((38, 3)), pattern=SimpleNamespace(azimuth=0.01), fit=fit)
+    merged = objects._merge_parts(scan, parts)
+    assert sorted(sorted(part.rows.tolist()) for part in merged) == [
+        *([n, n + 30] for n in range(8)),
+        *([n] for n in range(8, 30)),
+    ]
+    assert len(comparisons) <= 46 * 45 // 2 + 8
