@@ -79,6 +79,10 @@ The key is the pair of names in the order of the rows of the view, a building la
 """
 
 
+_NearPairs = dict[tuple[str, str], tuple[Body, Body]]
+"""Bodies that may touch, by the names of both."""
+
+
 class ContactTracker:
     """Tracker of the contacts that start: overlaps of boxes at the ends of steps, and contacts in pybullet.
 
@@ -106,7 +110,7 @@ class ContactTracker:
             return
         self._has_added = False
         rows = {name: row for row, name in enumerate(bodies)}
-        started = self._start(BodyGroup(tuple(bodies.values())), {})
+        started = self._start(_near_pairs(BodyGroup(tuple(bodies.values()))), {})
         in_order = tuple(sorted(started, key=lambda contact: (rows[contact.second], rows[contact.first])))
         if self._is_viewed:
             self._late += in_order
@@ -120,7 +124,9 @@ class ContactTracker:
 
     def step(self, bodies: BodyGroup, touches: Touches) -> None:
         """Find the contacts that started in a step; `touches` are those of pybullet."""
-        self._started = self._late + self._start(bodies, touches)
+        near = _near_pairs(bodies)
+        self._end_parted(near, bodies, touches)
+        self._started = self._late + self._start(near, touches)
         self._late, self._is_viewed = (), False
 
     def viewed(self) -> tuple[Contact, ...]:
@@ -128,13 +134,11 @@ class ContactTracker:
         self._is_viewed = True
         return self._started
 
-    def _start(self, bodies: BodyGroup, touches: Touches) -> tuple[Contact, ...]:
-        """Return the contacts that started since the last call."""
-        near = {(first.name, second.name): (first, second) for first, second in bodies.near_pairs(PARTED)}
-        if not (near or self._touching or touches):
-            return ()
-        begun: list[Contact] = []
-        moved = bodies.moved_names() if self._touching else set()
+    def _end_parted(self, near: _NearPairs, bodies: BodyGroup, touches: Touches) -> None:
+        """Forget the contacts of pairs that have parted in a step."""
+        if not self._touching:
+            return
+        moved = bodies.moved_names()
         for pair in [pair for pair in self._touching if pair not in touches]:
             if pair in near:
                 first, second = near[pair]
@@ -143,6 +147,10 @@ class ContactTracker:
             elif moved.isdisjoint(pair):
                 continue
             del self._touching[pair]
+
+    def _start(self, near: _NearPairs, touches: Touches) -> tuple[Contact, ...]:
+        """Return the contacts that started since the last call."""
+        begun: list[Contact] = []
         for pair, (first, second) in near.items():
             if pair in self._touching or pair in touches or not overlap(first.box, second.box):
                 continue
@@ -155,6 +163,10 @@ class ContactTracker:
                 self._touching[pair] = None
                 begun.append(Contact(*pair, *touch))
         return tuple(begun)
+
+
+def _near_pairs(bodies: BodyGroup) -> _NearPairs:
+    return {(first.name, second.name): (first, second) for first, second in bodies.near_pairs(PARTED)}
 
 
 def _shared_point(first: Body, second: Body) -> Vector3:

@@ -165,6 +165,23 @@ def test_building_stops_a_car(world: World, car: CarFactory) -> None:
     assert world.view().position[0, 0] + 3.6 <= 20.05
 
 
+@pytest.mark.parametrize("enter", [(), (30,), tuple(range(20, 60, 5))])
+def test_actors_that_enter_do_not_restart_a_contact_with_a_wall(
+    world: World, car: CarFactory, enter: tuple[int, ...]
+) -> None:
+    """The car scrapes along the wall from tick 6 on, while actors enter 500 m beside it."""
+    world.add_building("Wall", (100.0, 2.5, 1.5), (400.0, 1.0, 3.0))
+    world.add(car("Ego"), Placement(0.0, 0.0, yaw=0.15, speed=12.0), driven=True)
+    ticks = []
+    for tick in range(80):
+        world.step({}, {"Ego": Control(throttle=0.5, steering=0.1)})
+        if tick in enter:
+            world.add(car(f"Far {tick}"), Placement(10.0 * tick, -500.0))
+        ticks += [tick for _ in world.view().contacts]
+    assert ticks
+    assert max(ticks) < 20
+
+
 @pytest.mark.parametrize("driven", [False, True], ids=["scripted", "driven"])
 def test_contact_of_an_actor_that_is_added_inside_of_a_standing_one(
     world: World, car: CarFactory, driven: bool
