@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from recorded_scene import RunScene
-from storyboard_xml import global_xml, private_xml
+from storyboard_xml import global_xml, lane_position_xml, private_xml, teleport_xml
 from street_scene import NOTHING, after
+from whole_run import Run
 
 from eidrive_scenario.api.actions import CustomCommand, LightState, Override, Visibility
 from eidrive_scenario.errors import ScenarioError
+from eidrive_scenario.simulation import RunSettings
 
 
 @pytest.mark.element("AssignRouteAction")
@@ -30,6 +32,40 @@ def test_acquire_position_assigns_a_route_from_the_actor(scene: RunScene) -> Non
     path = scene(0.2, ("Ego", action), driven=True).commands[0].goals["Ego"].path
     assert path is not None
     assert np.allclose(path[[0, -1], :2], [[100.0, -2.0], [300.0, -2.0]])
+
+
+def acquire(s: float) -> str:
+    position = f"<Position>{lane_position_xml(-1, s)}</Position>"
+    return private_xml(f"<RoutingAction><AcquirePositionAction>{position}</AcquirePositionAction></RoutingAction>")
+
+
+@pytest.mark.element("TeleportAction")
+@pytest.mark.parametrize(
+    ("lane", "s", "start"), [(-1, 200.0, 100.0), (-2, 200.0, 100.0), (-1, 20.0, 20.0), (1, 200.0, None)]
+)
+def test_route_of_a_teleported_vehicle_leads_from_there(
+    scene: RunScene, lane: int, s: float, start: float | None
+) -> None:
+    """Beside the route it is unchanged, behind its start it is extended, and none leads from the opposite lane."""
+    teleport = teleport_xml(lane_position_xml(lane, s))
+    played = scene(0.6, ("Ego", acquire(300.0)), ("Ego", teleport, after(0.25)), driven=True)
+    path = played.commands[-1].goals["Ego"].path
+    assert (None if path is None else path[0, 0]) == start
+    assert path is None or path[-1, 0] == pytest.approx(300.0)
+
+
+@pytest.mark.element("TeleportAction")
+@pytest.mark.parametrize("planner", ["route", "behavior"])
+def test_vehicle_teleported_to_the_opposite_lane_follows_it_with_a_warning(run: Run, planner: str) -> None:
+    """At 20 m/s the vehicle is on lane 1, whose center is at y = 2 m, from x = 300 m on to the start of the road."""
+    teleport = teleport_xml(lane_position_xml(1, 300.0))
+    settings = RunSettings(planner=planner)
+    played = run(8.0, ("Ego", acquire(900.0)), ("Ego", teleport, after(2.0)), settings=settings)
+    there = [frame.view.position[frame.view.rows["Ego"]] for frame in played.frames if frame.view.time > 2.1]
+    assert [y for _, y, _ in there] == pytest.approx([2.0] * len(there), abs=0.3)
+    assert there[-1][0] < 190.0
+    (warning,) = [text for text in map(str, played.result.warnings) if "it follows its lane" in text]
+    assert "TeleportAction: no way leads to the destination of the route of 'Ego'" in warning
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from eidrive_behaviors.actions.teleport import describe_position
+from eidrive_behaviors.actions.routing import describe_position
 from eidrive_scenario.api.actions import ActionBehaviour, model, resolve_position
 
 

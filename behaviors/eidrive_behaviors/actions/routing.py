@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from functools import partial
@@ -10,7 +11,6 @@ import numpy as np
 from msgspec.structs import replace
 from py_trees.common import Status
 
-from eidrive_behaviors.actions.teleport import describe_position
 from eidrive_scenario.api.actions import (
     LONGEST_WAY,
     ActionBehaviour,
@@ -25,12 +25,14 @@ from eidrive_scenario.api.actions import (
     target_lane,
     uniform_branch_selector,
 )
-from eidrive_scenario.api.common import EidriveError, LaneLocation, RoadNetwork, Route, RouteError, generator
+from eidrive_scenario.api.common import Array, EidriveError, LaneLocation, RoadNetwork, Route, RouteError, generator
 
 POINTS_APART = 2.0
 """Maximum spacing of the points of a path that is handed to a controller [m]."""
 RANDOM_ROUTE_LENGTH = 5000.0
 """Length of a random route for a vehicle with an active controller [m]."""
+ON_ROUTE = 10.0
+"""Maximum distance from a route at which a vehicle that is teleported continues along it [m]."""
 
 
 class AssignRouteAction(ActionBehaviour):
@@ -215,3 +217,45 @@ def check_way(behaviour: ActionBehaviour, length: float) -> None:
         message = f"the way to the destination has a length of {length / 1000.0:,.0f} km"
         hint = f"a driven vehicle accepts at most {LONGEST_WAY / 1000.0:.0f} km: check the position"
         raise behaviour.error(message, hint)
+
+
+def resume_route(behaviour: ActionBehaviour, place: ResolvedPosition) -> None:
+    """Plan a new way to the destination of the route of a driven actor if the route does not lead along a position.
+
+    Without a way the actor follows its lane, with a warning.
+    """
+    actor, roads = behaviour.actor, behaviour.context.roads
+    goal, route = actor.goal, actor.motion.route
+    if roads is None or place.location is None or not actor.driven or goal is None or not goal.is_route:
+        return
+    if route is None or any(_leads_along(line, place) for line in (goal.path, goal.lap) if line is not None):
+        return
+    try:
+        way = roads.route(place.location, route.end)
+    except RouteError:
+        message = f"no way leads to the destination of the route of {actor.name!r}: it follows its lane"
+        behaviour.warn(message, "teleport it to a lane from which its destination can be reached")
+        actor.motion.set_route(None)
+        actor.set_goal(replace(goal, path=None, lap=None, is_route=False))
+    else:
+        assign_route(behaviour, dataclasses.replace(way, lap=route.onward))
+
+
+def _leads_along(line: Array, place: ResolvedPosition) -> bool:
+    """Return whether a line of points (M, 3) leads along the heading of a position next to it."""
+    x, y, _, heading, *_ = place.pose
+    away = np.hypot(*(line[:-1, :2] - (x, y)).T)
+    along = np.diff(line[:, :2], axis=0) @ (math.cos(heading), math.sin(heading)) > 0.0
+    return bool((along & (away <= ON_ROUTE)).any())
+
+
+def describe_position(position: model.Position) -> str:
+    """Describe frame and values of a position, as `LanePosition road 0 lane -3 s 50`."""
+    frame = position.chosen()
+    words = [type(frame).__name__]
+    for name, value in vars(frame).items():
+        if isinstance(value, str | int | float) and name not in ("line", "source"):
+            words.append(
+                f"{name.removesuffix('_id').removesuffix('_ref')} {value if isinstance(value, str) else f'{value:g}'}"
+            )
+    return " ".join(words)
