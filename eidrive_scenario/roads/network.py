@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -491,18 +491,36 @@ class RoadNetwork:
     ) -> Route:
         """Return the cheapest route over lanes from start to end. Raise RouteError if there is none.
 
-        With `against_traffic` it leads against the driving direction of the lanes. `costs` holds one cost function for
-        each leg: to each location of `via`, and to the end. None means the length, which is also the default.
+        With `against_traffic` it leads against the driving direction of the lanes. A route over two-way lanes only may
+        have either direction. `costs` holds one cost function for each leg: to each location of `via`, and to the end.
+        None means the length, which is also the default.
         """
         stops = [start, *via, end]
         wanted = costs if costs is not None else [None] * (len(stops) - 1)
-        parts = []
-        for (a, b), cost in zip(pairwise(stops), wanted, strict=True):
-            ends = (b, a) if against_traffic else (a, b)
-            lanes = self._find_lanes(*ends, cost)
-            ordered = lanes[::-1] if against_traffic else lanes
-            parts.append(Route(self.tables, ordered, a, b, against_traffic=against_traffic))
+        parts = [
+            self._find_route(a, b, cost, against_traffic=against_traffic)
+            for (a, b), cost in zip(pairwise(stops), wanted, strict=True)
+        ]
         return parts[0] if len(parts) == 1 else concatenate_routes(parts)
+
+    def _find_route(self, a: LaneLocation, b: LaneLocation, cost: Cost | None, *, against_traffic: bool) -> Route:
+        """Return the cheapest route of the given direction, or one of the other direction over two-way lanes only."""
+
+        def route(find: Callable[..., tuple[LaneKey, ...]], *, against_traffic: bool) -> Route:
+            lanes = find(b, a, cost)[::-1] if against_traffic else find(a, b, cost)
+            return Route(self.tables, lanes, a, b, against_traffic=against_traffic)
+
+        try:
+            return route(self._find_lanes, against_traffic=against_traffic)
+        except RouteError:
+            if not (self.lane(a).is_two_way and self.lane(b).is_two_way):
+                raise
+            with suppress(RouteError):
+                other = route(partial(find_lanes, self._ways, self.roads), against_traffic=not against_traffic)
+                sections = [(self.roads[key.road].sections[key.section], key.lane) for key in other.lanes]
+                if all(section.lanes[lane].is_two_way for section, lane in sections):
+                    return other
+            raise
 
     def _find_lanes(self, start: LaneLocation, end: LaneLocation, cost: Cost | None) -> tuple[LaneKey, ...]:
         """Return the lanes of the cheapest route. Raise RouteError; if the file lacks a link for it, with its rule."""

@@ -111,6 +111,8 @@ class RoutePlanner(Planner):
         self._way: tuple[Array | None, Array | None, Array | None] = (None, None, None)
         self._progress = 0
         self._lane: list[LaneLocation] = []
+        self._sense = 1
+        """-1 while the lane ahead is a two-way lane against its usual direction, else 1."""
         self._first_speed: float | None = None
         self._stops = SignalStops(roads, spec) if settings.obey_signals else None
         self._path_of_stops: PlannedPath | None = None
@@ -251,10 +253,15 @@ class RoutePlanner(Planner):
     def _lane_ahead(self, ego: EgoState) -> PlannedPath:
         """Return a path along the lane and its successors, extended from the last call; straight without a lane."""
         if self.roads is not None:
-            self._lane = self._lane[max(0, self._progress - BEHIND) :] or _lane_at(self.roads, ego)
+            self._lane = self._lane[max(0, self._progress - BEHIND) :]
+            if not self._lane:
+                self._lane, self._sense = _lane_at(self.roads, ego)
             onward = True
             while onward and self._lane and len(self._lane) < LOOK_AHEAD:
-                more = _further(self.roads, self._lane[-1])
+                if self._sense > 0:
+                    more = _further(self.roads, self._lane[-1])
+                else:
+                    more, self._sense = _further_against(self.roads, self._lane[-1])
                 self._lane += more
                 onward = bool(more)
             if len(self._lane) > 1:
@@ -269,16 +276,26 @@ def _lane_below(roads: RoadNetwork, ego: EgoState, hint: LaneLocation | None = N
     return roads.locate_pose(x, y, ego.yaw, z, hint, drivable=True)
 
 
-def _lane_at(roads: RoadNetwork, ego: EgoState) -> list[LaneLocation]:
-    """Return the lane at the vehicle, or the nearest one in its direction if traffic of that lane drives against it."""
+def _lane_at(roads: RoadNetwork, ego: EgoState) -> tuple[list[LaneLocation], int]:
+    """Return the lane at the vehicle, or the nearest one in its direction if traffic of that lane drives against it.
+
+    The second result is -1 for a two-way lane against its usual direction, else 1.
+    """
     location = _lane_below(roads, ego)
     if location is None or roads.angle_to_lane(location, ego.yaw) < math.pi / 2.0:
-        return [] if location is None else [location]
-    road, against = location.road, roads.driving_direction(location.road, location.lane)
+        return [] if location is None else [location], 1
+    if roads.lane(location).is_two_way:
+        return [location], -1
+    return _lane_of_direction(roads, location, -roads.driving_direction(location.road, location.lane)), 1
+
+
+def _lane_of_direction(roads: RoadNetwork, location: LaneLocation, direction: int) -> list[LaneLocation]:
+    """Return the location on the nearest lane for vehicles whose traffic drives in a direction, if there is one."""
+    road = location.road
     lanes = [
         roads.location(road, lane, location.s)
         for lane in roads.lane_ids(road, location.s, drivable=True)
-        if roads.driving_direction(road, lane) != against
+        if roads.driving_direction(road, lane) == direction
     ]
     return sorted(lanes, key=lambda lane: abs(lane.t - location.t))[:1]
 
@@ -295,6 +312,22 @@ def _further(roads: RoadNetwork, location: LaneLocation) -> list[LaneLocation]:
     while len(locations) <= STRIDE and (onward := roads.advance(locations[-1], SPACING)) is not None:
         locations.append(onward)
     return locations[1:]
+
+
+def _further_against(roads: RoadNetwork, location: LaneLocation) -> tuple[list[LaneLocation], int]:
+    """Return the next position on a two-way lane against its usual direction, none at its end.
+
+    Where it becomes a lane for one direction, the position is on the nearest lane of the direction of the vehicle. The
+    second result is -1 if the position is on a two-way lane against its usual direction, else 1.
+    """
+    ahead = roads.movement.travel(location, -SPACING)
+    if ahead is None:
+        return [], -1
+    there, direction = ahead
+    against = direction != roads.driving_direction(there.road, there.lane)
+    if against and not roads.lane(there).is_two_way:
+        return _lane_of_direction(roads, there, direction), 1
+    return [there], -1 if against else 1
 
 
 def _with_laps(line: Array, lap: Array) -> PlannedPath:

@@ -170,6 +170,44 @@ def test_vehicle_against_one_way_road_plans_straight_ahead(car: ActorSpec) -> No
     np.testing.assert_allclose(plan.points[:, 1], -1.75, atol=1e-6)
 
 
+def single_track(kind: str) -> str:
+    """Return the lane of a road with one lane of 4 m for both directions."""
+    return (
+        lane_xml(-1, 4).replace("<lane ", '<lane direction="both" ', 1)
+        if kind == "both"
+        else lane_xml(-1, 4, kind=kind)
+    )
+
+
+@pytest.mark.parametrize("kind", ["bidirectional", "both"])
+@pytest.mark.parametrize("waypoints", [False, True])
+def test_vehicle_against_the_usual_direction_follows_a_two_way_lane(car: ActorSpec, kind: str, waypoints: bool) -> None:
+    """The lane is an arc of 102 m radius around (0, 100)."""
+    lanes = section_xml(right=single_track(kind))
+    road = RoadNetwork.parse(map_xml(road_xml(length=300.0, curvature=0.01, lanes=lanes)))
+    start, end = road.lane_pose_at("1", -1, 250.0), road.lane_pose_at("1", -1, 150.0)
+    goal = Goal(waypoints=np.array([end[:3]])) if waypoints else None
+    route = planner(car, road, target_speed=10.0)
+    plan = route.plan(ego(start.x, start.y, start.h + math.pi), NOTHING, goal, 0.0)
+    np.testing.assert_allclose(np.hypot(plan.points[:, 0], plan.points[:, 1] - 100.0), 102.0, atol=0.05)
+    angles = np.unwrap(np.arctan2(plan.points[:, 0], 100.0 - plan.points[:, 1]))
+    assert angles[0] == pytest.approx(2.5, abs=0.02)
+    assert np.diff(angles).max() < 0.0
+
+
+def test_vehicle_behind_two_way_lane_is_in_lane_of_its_direction(car: ActorSpec) -> None:
+    """Behind the single track at x = 100 m the road to x = 0 has a lane of 3.5 m in each direction."""
+    linked = single_track("bidirectional").replace("<link>", f"<link>{lane_links_xml(-1)}", 1)
+    lanes = section_xml(lane_xml(1), lane_xml(-1)) + section_xml(right=linked, s=100.0)
+    road = RoadNetwork.parse(map_xml(road_xml(length=200.0, lanes=lanes)))
+    route = planner(car, road, target_speed=10.0)
+    plan = route.plan(ego(130.0, -2.0, math.pi), NOTHING, None, 0.0)
+    x, y = plan.points.T
+    np.testing.assert_allclose(y[x > 105.0], -2.0, atol=0.05)
+    np.testing.assert_allclose(y[x < 95.0], 1.75, atol=0.05)
+    assert x.min() < 75.0
+
+
 def test_waypoints_on_roads_give_route_to_a_stop(car: ActorSpec, roads: RoadNetwork) -> None:
     goal = Goal(waypoints=np.array([[60.0, -1.7, 0.0], [131.8, 80.0, 0.0]]))
     route = planner(car, roads, target_speed=9.0)

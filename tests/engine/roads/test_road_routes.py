@@ -174,6 +174,26 @@ def test_route_against_the_traffic_is_an_error(crossing: RoadNetwork) -> None:
         crossing.route(crossing.location("2", -1, 5.0), crossing.location("1", -1, 5.0))
 
 
+@pytest.mark.parametrize("is_two_way", [True, False])
+def test_route_over_two_way_lanes_leads_in_both_directions(is_two_way: bool) -> None:
+    """A ring of two half circles of 52 m radius in the lane, cut at one end: b leads to a."""
+    kind = "bidirectional" if is_two_way else "driving"
+    lanes = section_xml(right=lane_xml(-1, 4, kind=kind, link=lane_links_xml(-1, -1)))
+    ring = ring_xml(50.0, lanes).replace(predecessor_xml("a"), "").replace(successor_xml("b"), "")
+    network = RoadNetwork.parse(ring)
+    a, b = network.location("a", -1, 100.0), network.location("b", -1, 50.0)
+    forward = network.route(b, a)
+    assert [key.road for key in forward.lanes] == ["b", "a"]
+    if not is_two_way:
+        with pytest.raises(RouteError, match=r"no route over the lanes leads from road 'a'"):
+            network.route(a, b)
+        return
+    back = network.route(a, b, via=[network.location("a", -1, 20.0)])
+    assert [key.road for key in back.lanes] == ["a", "b"]
+    assert back.length == pytest.approx(forward.length)
+    np.testing.assert_allclose(back.polyline(1.0)[::-1], forward.polyline(1.0), atol=0.02)
+
+
 def test_route_passes_intermediate_locations() -> None:
     network = ring()
     a, b = network.location("a", -1, 10.0), network.location("a", -1, 60.0)
