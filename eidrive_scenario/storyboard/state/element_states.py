@@ -64,10 +64,14 @@ NOT_STARTED = ElementState.STANDBY
 
 @dataclass
 class ElementRecord:
-    """Path of one element in the tree, its state, and the ticks of its transitions."""
+    """Path of one element in the tree, its state, and the ticks of its transitions.
+
+    number   position in the order of registration; that of events is the order in the file
+    """
 
     kind: str
     path: tuple[str, ...]
+    number: int
     state: ElementState | None = None
     transitions: list[tuple[int, ElementTransition]] = field(default_factory=list)
 
@@ -86,7 +90,7 @@ class ElementStates:
 
     def register(self, kind: str, path: tuple[str, ...]) -> ElementRecord:
         """Register an element and return its record."""
-        record, self._matches = ElementRecord(kind, path), None
+        record, self._matches = ElementRecord(kind, path, len(self.records)), None
         self.records.append(record)
         return record
 

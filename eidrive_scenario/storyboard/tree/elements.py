@@ -3,7 +3,7 @@
 `tick_tree` executes one tick:
 
 1. Actions that the last step completed end, and with them, bottom up, the elements whose children are complete.
-2. `evaluate_trigger` stops and starts elements, top down.
+2. Triggers are evaluated, and stop and start elements, top down.
 3. `update_children` lets each running action decide on the next step, once per tick. Actions that only set a value end.
 
 Steps 2 and 3 repeat while a state changes, so that a chain of elements is executed in one tick: transitions consume no
@@ -81,25 +81,30 @@ class StoryElement(Composite):
             for element in self.elements:
                 yield from element.awaited_triggers()
 
-    def evaluate_trigger(self) -> None:
-        """Stop or start this element by its trigger; the triggers of the children of a started one are evaluated, too.
+    def evaluate_stop_trigger(self) -> None:
+        """Stop the running element if its trigger fires, which is evaluated from the tick after the start on.
 
-        A stop trigger is evaluated from the tick after the start on, that of the storyboard from the first tick on.
+        That of the storyboard is evaluated from the first tick on.
         """
-        state = self.record.state
-        if state is ElementState.COMPLETE or self._tried_at == self.context.progress.tick:
-            return
-        if state is ElementState.RUNNING:
-            stop = self.stop_leaf
-            if stop is not None and stop.is_fired():
-                self.stop_element(stop.trigger.why)
-        elif state is ElementState.STANDBY:
-            start = self.start_leaf
-            if start is None or start.is_fired():
-                self.start(NO_TRIGGER if start is None else start.trigger.why)
-                if self.record.state is ElementState.RUNNING:
-                    for element in self.elements:
-                        element.evaluate_trigger()
+        stop = self.stop_leaf
+        if stop is not None and self.record.state is ElementState.RUNNING and not self._is_tried and stop.is_fired():
+            self.stop_element(stop.trigger.why)
+
+    def is_triggered(self) -> bool:
+        """Whether the element waits and its start trigger fires, or it has none."""
+        if self.record.state is not ElementState.STANDBY or self._is_tried:
+            return False
+        return self.start_leaf is None or self.start_leaf.is_fired()
+
+    @property
+    def start_reason(self) -> str:
+        """Reason for the start after its trigger fired."""
+        return NO_TRIGGER if self.start_leaf is None else self.start_leaf.trigger.why
+
+    @property
+    def _is_tried(self) -> bool:
+        """Whether it started or was skipped in this tick."""
+        return self._tried_at == self.context.progress.tick
 
     def start(self, why: str = "") -> None:
         """Enter runningState; the children enter standbyState."""
@@ -199,13 +204,15 @@ class StoryboardElement(StoryElement):
                 self._listed = progress.version
                 self._awaited = tuple(self.awaited_triggers())
                 self._running_actions = tuple(self.running_actions())
-            for element, trigger in self._awaited:
-                if (
-                    trigger.rests_until <= time
+            self._evaluate_triggers(
+                [
+                    element
+                    for element, trigger in self._awaited
+                    if trigger.rests_until <= time
                     or trigger.version != progress.version
                     or not moved.isdisjoint(trigger.reads)
-                ):
-                    element.evaluate_trigger()
+                ]
+            )
             if self.state is not ElementState.RUNNING:
                 return
             if init is not None:
@@ -216,6 +223,26 @@ class StoryboardElement(StoryElement):
                 pending, self.context.pending_actions = self.context.pending_actions, []
                 for abort in pending:
                     abort()
+
+    def _evaluate_triggers(self, elements: Sequence[StoryElement]) -> None:
+        """Evaluate the triggers of these elements, and those of the children of elements that start.
+
+        Elements stop before others start. A trigger is evaluated before elements of its level start, and before events
+        start, so that it observes these starts as changes, independently of the order in the file. Events start in this
+        order.
+        """
+        for element in elements:
+            element.evaluate_stop_trigger()
+        events: list[StoryElement] = []
+        while elements:
+            triggered = [element for element in elements if element.is_triggered()]
+            events += [element for element in triggered if element.kind == "event"]
+            parents = [element for element in triggered if element.kind != "event"]
+            for element in parents:
+                element.start(element.start_reason)
+            elements = [child for element in parents for child in element.elements]
+        for event in sorted(events, key=lambda event: event.record.number):
+            event.start(event.start_reason)
 
     def update_children(self) -> None:
         """Update the running actions. From the first change of a state on, other elements may be complete as well."""

@@ -8,10 +8,14 @@ import pytest
 from msgspec.structs import replace
 from openscenario_xml import variables_xml
 from storyboard_xml import (
+    act_xml,
+    acts_xml,
     condition_xml,
     element_state_xml,
     event_xml,
+    group_xml,
     groups_xml,
+    maneuver_xml,
     speed_xml,
     teleport_xml,
     time_xml,
@@ -69,6 +73,53 @@ def test_chain_transitions_in_one_step_in_any_order(build: Any, state: str, edge
     assert ticks[0] == ["storyboard starts"]
     assert ticks[1][:6] == [f"{name} {word}" for name in ("first", "second", "third") for word in ("starts", "ends")]
     assert ticks[2] == []
+
+
+def as_events(first: str, second: str) -> tuple[str, str]:
+    """Return two events of one maneuver: `slow`, and `after` with a trigger."""
+    return event("slow", first, speed_xml(1, 3)), event("after", second)
+
+
+def as_groups(first: str, second: str) -> tuple[str, str]:
+    """Return these events in two groups of one act."""
+    slow, after = as_events(first, second)
+    return group_xml(maneuver_xml(slow), "A", name="1"), group_xml(maneuver_xml(after), "A", name="2")
+
+
+def as_acts(first: str, second: str) -> tuple[str, str]:
+    """Return two acts with these triggers, of which the first one is named as the event."""
+    events = event("one", "", speed_xml(1, 3)), event("other")
+    slow, after = (group_xml(maneuver_xml(inside), "A") for inside in events)
+    return act_xml(slow, first, name="slow"), act_xml(after, second, name="after")
+
+
+@pytest.mark.element("StoryboardElementStateCondition")
+@pytest.mark.parametrize("state", ["startTransition", "runningState"])
+@pytest.mark.parametrize("first", ["", trigger_xml(condition_xml(time_xml(0, "greaterOrEqual")))])
+@pytest.mark.parametrize("parts", [as_events, as_groups, as_acts])
+@pytest.mark.parametrize("order", [list, reversed])
+def test_start_with_parent_is_observed_as_edge_in_any_order(
+    build: Any, state: str, first: str, parts: Any, order: Any
+) -> None:
+    kind = "act" if parts is as_acts else "event"
+    pair = "".join(order(parts(first, when(element_state_xml(kind, "slow", state), edge="rising"))))
+    inside = group_xml(maneuver_xml(pair), "A") if parts is as_events else pair
+    storyboard = build(PLACE, story=acts_xml(pair if parts is as_acts else act_xml(inside)))
+    storyboard.initial()
+    storyboard.tick(storyboard.context.view)
+    assert [c.element for c in storyboard.changes if c.kind == kind and c.transition is ElementTransition.START] == [
+        "slow",
+        "after",
+    ]
+
+
+@pytest.mark.element("StoryboardElementStateCondition")
+def test_events_of_one_instant_start_though_one_changes_the_value_of_another(build: Any) -> None:
+    writer = event("writer", when(time_xml(0.05)), action=SET.format(value="7"))
+    reader = event("reader", when(time_xml(0.05), VARIABLE.format(value="0")))
+    for events in (writer + reader, reader + writer):
+        ticks = course(build(PLACE, events, declared=variables_xml(x=("int", "0"))), 2)
+        assert {"writer starts", "reader starts"} <= set(ticks[1])
 
 
 @pytest.mark.element("StoryboardElementStateCondition")
