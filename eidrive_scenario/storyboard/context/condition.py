@@ -63,8 +63,8 @@ class Condition(ABC):
     """True if its value can change within a tick, as states of elements and values that actions set do. It is then
     evaluated again after such a change. Other conditions are evaluated once per tick."""
     reads: Collection[MotionChange] | None = None
-    """Motion that changes its value, beside time and the states of storyboard elements. None if anything else changes
-    it: it is then evaluated in every tick, as conditions of third parties are."""
+    """Motion that changes its value, beside time and, if it is `instant`, the states of storyboard elements. None if
+    anything else changes it: it is then evaluated in every tick, as conditions of third parties are."""
 
     def __init__(self, element: model.Element) -> None:
         self.element = element

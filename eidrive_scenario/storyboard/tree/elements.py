@@ -13,6 +13,7 @@ Until a state changes, they visit the elements that wait for a trigger, and the 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -71,15 +72,16 @@ class StoryElement(Composite):
         if self.limit < 1:
             self._change(ElementTransition.SKIP, ElementState.COMPLETE, "maximumExecutionCount is 0")
 
-    def awaited_triggers(self) -> Iterator[tuple[StoryElement, Trigger]]:
-        """Yield the elements, this one and below, that wait for a trigger, top down, and the triggers."""
-        if self.record.state is ElementState.STANDBY:
-            yield self, ALWAYS if self.start_leaf is None else self.start_leaf.trigger
-        elif self.record.state is ElementState.RUNNING:
+    def list_active(self, awaited: list[tuple[StoryElement, Trigger]], actions: list[StoryElement]) -> None:
+        """Add the elements from this one down that await a trigger, and the running actions, to the lists, top down."""
+        state = self.record.state
+        if state is ElementState.STANDBY:
+            awaited.append((self, ALWAYS if self.start_leaf is None else self.start_leaf.trigger))
+        elif state is ElementState.RUNNING:
             if self.stop_leaf is not None:
-                yield self, self.stop_leaf.trigger
+                awaited.append((self, self.stop_leaf.trigger))
             for element in self.elements:
-                yield from element.awaited_triggers()
+                element.list_active(awaited, actions)
 
     def evaluate_stop_trigger(self) -> None:
         """Stop the running element if its trigger fires, which is evaluated from the tick after the start on.
@@ -137,12 +139,6 @@ class StoryElement(Composite):
                 element.complete_finished()
             self.complete_if_done()
 
-    def running_actions(self) -> Iterator[StoryElement]:
-        """Yield the running actions, this element and below."""
-        if self.record.state is ElementState.RUNNING:
-            for element in self.elements:
-                yield from element.running_actions()
-
     def update_children(self) -> None:
         """Update the running children; end if all of them are complete."""
         self.status = Status.RUNNING
@@ -184,8 +180,8 @@ class StoryboardElement(StoryElement):
     kind = "storyboard"
     _listed = _updated = -1
     """Number of state changes before the lists of elements were made, and before all elements were updated."""
-    _awaited: tuple[tuple[StoryElement, Trigger], ...] = ()
-    _running_actions: tuple[StoryElement, ...] = ()
+    _awaited: Sequence[tuple[StoryElement, Trigger]] = ()
+    _running_actions: Sequence[StoryElement] = ()
 
     def tick_tree(self, init: Behaviour | None = None) -> None:
         """Tick the tree, and the actions of Init that are running."""
@@ -202,17 +198,19 @@ class StoryboardElement(StoryElement):
             seen = len(progress.changes)
             if self._listed != progress.version:
                 self._listed = progress.version
-                self._awaited = tuple(self.awaited_triggers())
-                self._running_actions = tuple(self.running_actions())
+                awaited: list[tuple[StoryElement, Trigger]] = []
+                actions: list[StoryElement] = []
+                self.list_active(awaited, actions)
+                self._awaited, self._running_actions = awaited, actions
+            version = progress.version
             self._evaluate_triggers(
                 [
                     element
                     for element, trigger in self._awaited
-                    if trigger.rests_until <= time
-                    or trigger.version != progress.version
-                    or not moved.isdisjoint(trigger.reads)
+                    if trigger.version < version or trigger.rests_until <= time or not moved.isdisjoint(trigger.reads)
                 ]
             )
+            moved, time = set(), -math.inf  # Motion and time are constant within a tick.
             if self.state is not ElementState.RUNNING:
                 return
             if init is not None:

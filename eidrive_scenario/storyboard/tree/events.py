@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 
 from py_trees.common import Status
 
@@ -11,7 +11,7 @@ from eidrive_scenario.storyboard.context.contexts import EntityUnavailableError
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition
 from eidrive_scenario.storyboard.tree.elements import StoryElement, TriggeringEntities
-from eidrive_scenario.storyboard.tree.trigger import WaitForTrigger
+from eidrive_scenario.storyboard.tree.trigger import Trigger, WaitForTrigger
 
 
 class EventElement(StoryElement):
@@ -188,10 +188,10 @@ class ActionElement(StoryElement):
             completing, self._completing = self._completing, []
             self._end_behaviours(completing)
 
-    def running_actions(self) -> Iterator[StoryElement]:
-        """Yield the action if it is running."""
+    def list_active(self, awaited: list[tuple[StoryElement, Trigger]], actions: list[StoryElement]) -> None:
+        """Add the action to the running ones if it is running."""
         if self.record.state is ElementState.RUNNING:
-            yield self
+            actions.append(self)
 
     def update_children(self) -> None:
         """Update the behaviours once per tick; those that reach their goals end at the end of the step."""

@@ -144,7 +144,8 @@ class Trigger:
     elements, and the time that a condition awaits. As it did not fire at the last evaluation, it does not fire then.
 
     reads        motion that can let it fire
-    version      number of state changes of elements before the last evaluation
+    version      number of state changes of elements before the last evaluation; inf if it reads no values that change
+                 within a tick, so that one evaluation per tick suffices
     rests_until  time [s] before which a change of motion or states is required to let it fire
     """
 
@@ -155,7 +156,8 @@ class Trigger:
         are_built_in = all(is_built_in(type(evaluator.condition)) for evaluator in self._evaluators)
         self._can_rest = are_built_in and None not in reads
         self.reads = frozenset(name for names in reads if names for name in names)
-        self.version = -1
+        self._is_instant = any(evaluator.condition.instant for evaluator in self._evaluators)
+        self.version: float = -1
         self.rests_until = -math.inf
         self.why = ""
         self.observer: TriggerHistory | None = None
@@ -176,9 +178,9 @@ class Trigger:
             self.observer.on_evaluated(context)
         version, self.rests_until = context.progress.version, -math.inf
         # After a change it is evaluated twice, so that edges are over.
-        if self._can_rest and version == self.version and not fired and context.moved.isdisjoint(self.reads):
+        if self._can_rest and version <= self.version and not fired and context.moved.isdisjoint(self.reads):
             self.rests_until = self._next_evaluation(context)
-        self.version = version
+        self.version = version if self._is_instant else math.inf
         return bool(fired)
 
     def _next_evaluation(self, context: RuntimeContext) -> float:

@@ -27,7 +27,7 @@ from storyboard_xml import (
 
 from eidrive_scenario.openscenario import load_scenario
 from eidrive_scenario.simulation import RunSettings, Simulation
-from eidrive_scenario.storyboard.state.element_states import StateChange
+from eidrive_scenario.storyboard.state.element_states import ElementTransition, StateChange
 from eidrive_scenario.storyboard.tree.trigger import ConditionEvaluator, TriggerHistory
 
 CONDITIONS = {
@@ -102,7 +102,19 @@ def test_resting_triggers_fire_as_triggers_that_are_evaluated_in_every_tick() ->
     assert found == expected
 
 
-def test_condition_of_standing_car_is_evaluated_only_after_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("others", [0, 99])
+@pytest.mark.parametrize(
+    ("inside", "most"),
+    [
+        (by_entity_xml('<SpeedCondition rule="greaterThan" value="5"/>', "Other"), 5),
+        (time_xml(9.0), 5),
+        (by_entity_xml('<EndOfRoadCondition duration="1"/>', "Other"), 101),
+    ],
+    ids=["standing car", "time", "every step"],
+)
+def test_condition_is_evaluated_only_after_changes_of_what_it_reads(
+    monkeypatch: pytest.MonkeyPatch, inside: str, most: int, others: int
+) -> None:
     counts: Counter[str] = Counter()
     evaluate = ConditionEvaluator.evaluate
 
@@ -111,13 +123,18 @@ def test_condition_of_standing_car_is_evaluated_only_after_changes(monkeypatch: 
         return evaluate(evaluator, context)  # type: ignore[arg-type]
 
     monkeypatch.setattr(ConditionEvaluator, "evaluate", count)
-    fast = by_entity_xml('<SpeedCondition rule="greaterThan" value="5"/>', "Other")
+    events = [noted(f"{n}", condition_xml(time_xml(0.05 * n), name="other")) for n in range(others)]
     text = scenario_xml(
         entities=object_xml("Ego") + object_xml("Other"),
         init=init_xml("Ego", teleport_xml(world_position_xml(0)), speed_xml(9))
         + init_xml("Other", teleport_xml(world_position_xml(0, 9))),
-        story=acts_xml(act_xml(group_xml(maneuver_xml(noted("fast", condition_xml(fast, name="fast")))))),
+        story=acts_xml(
+            act_xml(
+                group_xml(maneuver_xml("".join([noted("waiting", condition_xml(inside, name="waiting")), *events])))
+            )
+        ),
         stop=end_xml(5.0),
     )
-    changes(Simulation(load_scenario(text), settings=RunSettings(dt=0.05, no_criteria=True)))
-    assert 2 <= counts["fast"] <= 5
+    executed = changes(Simulation(load_scenario(text), settings=RunSettings(dt=0.05, no_criteria=True)))
+    assert sum(c.kind == "event" and c.transition is ElementTransition.END for c in executed) == others
+    assert 2 <= counts["waiting"] <= most
