@@ -107,6 +107,30 @@ def test_parameter_action_sets_the_parameter_of_one_use_of_a_catalog_maneuver(tm
     assert record.begun("follow") == [pytest.approx(0.5)]
 
 
+@pytest.mark.element("ParameterSetAction", "CatalogReference")
+@pytest.mark.parametrize("own", ["", parameters_xml(Speed=("double", "2"))])
+def test_parameter_action_of_a_catalog_maneuver_sets_the_parameter_of_the_scenario(tmp_path: Path, own: str) -> None:
+    action = global_xml('<ParameterAction parameterRef="Level"><SetAction value="7"/></ParameterAction>')
+    setting = event_xml("set", action, trigger_xml(condition_xml(time_xml(0.45))))
+    (tmp_path / "c.xosc").write_bytes(catalog_xml("c", maneuver_xml(own + setting)))
+    follow = maneuver_xml(event_xml("follow", NOTHING, when_parameter_is("7")))
+    text = scenario_xml(
+        catalogs='<ManeuverCatalog><Directory path="."/></ManeuverCatalog>',
+        declarations=parameters_xml(Level=("double", "2")),
+        story=acts_xml(
+            act_xml(
+                group_xml('<CatalogReference catalogName="c" entryName="maneuver"/>', name="1")
+                + group_xml(follow, name="2")
+            )
+        ),
+    )
+    path = tmp_path / "s.xosc"
+    path.write_bytes(text)
+    record = RecordedRun()
+    Simulation(load_scenario(path), settings=RunSettings(time_limit=1.0), observers=[record]).run()
+    assert record.begun("follow") == [pytest.approx(0.5)]
+
+
 @pytest.mark.parametrize(
     ("text", "rule", "limit", "expected"),
     [

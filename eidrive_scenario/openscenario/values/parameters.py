@@ -121,11 +121,11 @@ class Scope:
             scope = scope.outer
         raise ExpressionError(f"unknown parameter ${shortened(name, 200)}", suggestion(name, self.names()))
 
-    def declaring(self, name: str) -> Scope | None:
-        """Return the innermost scope that declares a parameter of a name; None if it is unknown."""
+    def declared(self, name: str) -> Parameter | None:
+        """Return the innermost parameter of a name; None if it is unknown."""
         if name in self.parameters:
-            return self
-        return self.outer.declaring(name) if self.outer is not None else None
+            return self.parameters[name]
+        return self.outer.declared(name) if self.outer is not None else None
 
     def names(self) -> set[str]:
         """Return all visible names."""

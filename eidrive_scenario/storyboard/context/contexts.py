@@ -15,7 +15,7 @@ import numpy as np
 from eidrive_scenario.base.requests import Override
 from eidrive_scenario.errors import Diagnostic, ScenarioError, SimulationError
 from eidrive_scenario.openscenario import Scenario, model
-from eidrive_scenario.openscenario.values.parameters import Scope
+from eidrive_scenario.openscenario.values.parameters import Parameter, Scope
 from eidrive_scenario.roads import LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.kinematics.actor import Actor
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
@@ -41,10 +41,10 @@ MotionChange = str | tuple[str, str]
 """Change of the state of an entity, by its name, or of its speed, by its name and `speed`."""
 
 
-def declaring_scope(element: model.ParameterCondition | model.ParameterAction) -> Scope | None:
-    """Return the scope that declares the parameter of an element, the innermost one of its name; None if unknown."""
+def _referenced_parameter(element: model.ParameterCondition | model.ParameterAction) -> Parameter | None:
+    """Return the parameter to which an element refers, the innermost one of its name; None if it is unknown."""
     scope: Scope | None = element.scope
-    return None if scope is None else scope.declaring(element.parameter_ref)
+    return None if scope is None else scope.declared(element.parameter_ref)
 
 
 def speed_change(name: str) -> MotionChange:
@@ -119,8 +119,8 @@ class ConditionContext:
         self.seed = seed
         self.view = _empty_view()
         self.progress = ElementStates()
-        self.assigned_parameters: Mapping[tuple[int, str], str] = {}
-        """Values that actions have set, by the identity of the declaring scope and name."""
+        self.assigned_parameters: Mapping[int, str] = {}
+        """Values that actions have set, by the identity of the parameter."""
         self.variables: Mapping[str, str] = scenario.variables
         network = scenario.document.road_network
         self.signals = Signals(network.traffic_signals if network is not None else None, roads)
@@ -152,10 +152,8 @@ class ConditionContext:
         """Return the value of the parameter to which an element refers: that which an action has set, otherwise that of
         the scenario, story or maneuver that declares it. None if it is unknown.
         """
-        name, scope = element.parameter_ref, declaring_scope(element)
-        if scope is None:
-            return None
-        return self.assigned_parameters.get((id(scope), name), scope.parameters[name].text)
+        parameter = _referenced_parameter(element)
+        return None if parameter is None else self.assigned_parameters.get(id(parameter), parameter.text)
 
     @property
     def time(self) -> float:
@@ -344,8 +342,8 @@ class ActionContext(ConditionContext):
 
     def set_parameter(self, element: model.ParameterAction, value: str) -> None:
         """Set the value of the parameter to which an action refers."""
-        if (scope := declaring_scope(element)) is not None:
-            self.assigned_parameters = {**self.assigned_parameters, (id(scope), element.parameter_ref): value}
+        if (parameter := _referenced_parameter(element)) is not None:
+            self.assigned_parameters = {**self.assigned_parameters, id(parameter): value}
 
     def set_variable(self, name: str, value: str) -> None:
         """Set the value of a variable."""

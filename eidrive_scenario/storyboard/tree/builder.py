@@ -220,11 +220,13 @@ class Builder:
         selected = triggering if group.actors.select_triggering_entities else None
         bindings = ActorBindings(actors, [names for names in members if len(names) > 1], selected)
         maneuvers = list(group.maneuver)
+        scope = self._scenario.scope
+        shared = {id(parameter): parameter for parameter in scope.parameters.values()} if scope is not None else {}
         for reference in group.catalog_reference:
             with self._collecting_errors():
                 maneuver = self._context.catalog_entry(reference, model.Maneuver, group)
-                # Equal references have the same entry, but each use has its own parameters.
-                maneuvers.append(deepcopy(maneuver) if maneuver.parameter_declarations else maneuver)
+                # Equal references have the same entry, but each use has its own parameters, beside the scenario's.
+                maneuvers.append(deepcopy(maneuver, dict(shared)) if maneuver.parameter_declarations else maneuver)
         children = [self._maneuver(maneuver, path, bindings) for maneuver in maneuvers]
         return ManeuverGroupElement(self._context, path, children, limit=group.maximum_execution_count)
 
