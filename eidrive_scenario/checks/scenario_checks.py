@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+import itertools
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,7 @@ from eidrive_scenario.openscenario.reading.parsing import open_document
 from eidrive_scenario.openscenario.reading.reader import Reader
 from eidrive_scenario.openscenario.reading.workarounds import apply_workarounds
 from eidrive_scenario.openscenario.validation.rules import check_values
+from eidrive_scenario.openscenario.values.parameters import Assignment
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.run_options import checked_settings
 from eidrive_scenario.simulation import RunSettings, Simulation
@@ -99,11 +101,14 @@ def check_scenario(source: Source, ignored: Collection[str] = (), settings: RunS
 
 
 def scenario_diagnostics(
-    source: Source, ignored: Collection[str] = (), settings: RunSettings | None = None
+    source: Source,
+    ignored: Collection[str] = (),
+    settings: RunSettings | None = None,
+    parameters: Mapping[str, Assignment] | None = None,
 ) -> Iterator[tuple[Level, Diagnostic]]:
-    """Yield all diagnostics of a scenario, neither sorted nor limited in number."""
+    """Yield all diagnostics of a scenario with these parameters, neither sorted nor limited in number."""
     try:
-        scenario = load_scenario(source)
+        scenario = load_scenario(source, parameters)
     except InputError as error:
         yield from _errors(error)
         return
@@ -220,12 +225,29 @@ class _DistributionDiagnostics:
         self._added = added_sources(settings)
         self._diagnostics: dict[tuple[Level, Diagnostic], None] = {}
         self._add(Level.WARNING, expansion.warnings)
-        self._diagnostics.update(dict.fromkeys(scenario_diagnostics(expansion.scenario, ignored, settings)))
+        parameters = self._allowed_parameters()
+        self._diagnostics.update(dict.fromkeys(scenario_diagnostics(expansion.scenario, ignored, settings, parameters)))
         self._known_rules = {_location(diagnostic) for _, diagnostic in self._diagnostics if diagnostic.rule}
         self._read: set[int] = set()
 
     def __iter__(self) -> Iterator[tuple[Level, Diagnostic]]:
         return iter(self._diagnostics)
+
+    def _allowed_parameters(self) -> Mapping[str, Assignment]:
+        """Return no parameters if the defaults satisfy their constraints, otherwise those of the first run that does.
+
+        No run uses the default of a parameter that the distribution varies.
+        """
+        runs = (self._expansion[number].assignments for number in sorted(set(_value_runs(self._expansion))))
+        for parameters in itertools.islice(itertools.chain([{}], runs), _MAX_VALUE_RUNS):
+            try:
+                load_scenario(self._expansion.scenario, parameters)
+            except ConstraintError:
+                continue
+            except InputError:
+                break
+            return parameters
+        return {}
 
     def read_runs(self) -> None:
         """Read the runs of all listed values, and further ones spread over all combinations."""

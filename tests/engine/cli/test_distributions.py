@@ -113,6 +113,22 @@ def test_distribution_without_allowed_run_is_invalid_input(eidrive: Eidrive, var
     assert "outside its constraints" in result.stderr.splitlines()[-1]
 
 
+def test_check_of_distribution_uses_no_default_that_it_varies(
+    eidrive: Eidrive, vary: Callable[..., Path], tmp_path: Path
+) -> None:
+    """The default of OtherY, 10, violates its constraint, as the first value does; no run uses it."""
+    path = vary(values_xml("OtherY", "9", "5"))
+    scenario = tmp_path / "passing_by.xosc"
+    scenario.write_text(scenario.read_text(encoding="utf-8").replace('value="5.0"', 'value="10.0"'), encoding="utf-8")
+    result = eidrive("check", path)
+    assert result.exit_code == 0, result.output
+    assert "'OtherY' is '9', outside its constraints; expected lessThan 9; such runs are skipped" in result.output
+    assert "'OtherY' is '10.0'" not in result.output
+    vary(values_xml("End", "2"))
+    scenario.write_text(scenario.read_text(encoding="utf-8").replace('value="5.0"', 'value="10.0"'), encoding="utf-8")
+    assert "'OtherY' is '10.0', outside its constraints" in eidrive("check", path).output
+
+
 @pytest.mark.parametrize(
     ("texts", "completed", "code"), [(("fast", "5"), 0, 2), (("5", "fast", "4"), 2, 2)], ids=["first", "later"]
 )
