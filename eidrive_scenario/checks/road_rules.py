@@ -111,11 +111,13 @@ def unknown_lanes(context: RoadLintContext) -> Iterator[Diagnostic]:
     """Yield lane changes to a lane that no road has."""
     if context.roads is None:
         return
-    lanes = {str(number) for road in context.roads.roads.values() for part in road.sections for number in part.lanes}
+    lanes = {number for road in context.roads.roads.values() for part in road.sections for number in part.lanes} - {0}
     for action in context.of(model.LaneChangeAction):
         target = action.lane_change_target.absolute_target_lane
-        if target is not None and target.value.strip() not in lanes - {"0"}:
-            shown = ", ".join(sorted(lanes - {"0"}, key=int))
+        if target is None or not target.value.removeprefix("-").isdecimal():
+            continue  # Other texts are errors of the run setup.
+        if int(target.value) not in lanes:
+            shown = ", ".join(str(lane) for lane in sorted(lanes))
             yield at(target, f"lane {target.value!r} exists on no road", f"known: {shown}")
 
 

@@ -189,6 +189,13 @@ def test_above_max_speed_applies_to_negative_speeds(folder: Path) -> None:
     assert "above-max-speed" not in violated_rules(folder, speed_xml(-60, 2))
 
 
+@pytest.mark.parametrize("lane", ["-1", "-01", "-2"])
+def test_unknown_lane_compares_numbers(folder: Path, lane: str) -> None:
+    example = re.sub(r'(<AbsoluteTargetLane value=)"[^"]*"', rf'\1"{lane}"', EXAMPLES["unknown-lane"][1])
+    assert f'value="{lane}"' in example
+    assert ("unknown-lane" in violated_rules(folder, example)) == (lane == "-2")
+
+
 @pytest.mark.parametrize("turned", ["waypoint", "actor", ""])
 def test_no_route_accepts_a_route_of_a_wrong_way_driver(folder: Path, turned: str) -> None:
     """The route of the example leads back; its waypoints, or the position of its actor, may face that way."""
