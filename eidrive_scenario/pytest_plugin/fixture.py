@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -77,10 +78,12 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         raise pytest.fail.Exception(f"{metafunc.definition.nodeid}: {error}", pytrace=False) from None
     variants = list(run_variants(metafunc.config, channels, seeds, added, rate))
     config = metafunc.config
+    names = {path: test_name(config, path, all_folders=False) for path in paths}
+    count = Counter(names.values())
     cases = [
         pytest.param(
             (path, variant),
-            id=f"{test_name(config, path)}-{variant}",
+            id=f"{test_name(config, path, all_folders=count[names[path]] > 1)}-{variant}",
             marks=tuple(run_markers(config, path, variant.selectors, None)),
         )
         for path in paths

@@ -116,7 +116,7 @@ class ScenarioFile(pytest.File):
     def collect(self) -> Iterable[ScenarioItem]:
         """Yield one item per channel and seed."""
         for variant in run_variants(self.config):
-            name = f"{test_name(self.config, self.path)}[{variant}]"
+            name = f"{test_name(self.config, self.path, all_folders=False)}[{variant}]"
             yield ScenarioItem.from_parent(self, name=name, variant=variant)
 
 
@@ -145,7 +145,7 @@ class DistributionFile(pytest.File):
         for number in numbers:
             run = runs[number]
             for variant in run_variants(self.config):
-                name = f"{test_name(self.config, self.path)}[{_run_name(run)}-{variant}]"
+                name = f"{test_name(self.config, self.path, all_folders=False)}[{_run_name(run)}-{variant}]"
                 yield ScenarioItem.from_parent(self, name=name, run=run, variant=variant)
 
 

@@ -51,13 +51,14 @@ def family_of(path: Path) -> str:
     return "" if name in _RESERVED else name
 
 
-def test_name(config: pytest.Config, path: Path) -> str:
+def test_name(config: pytest.Config, path: Path, *, all_folders: bool) -> str:
     """Return the part of a test name that a scenario file has, such as `coop/scenario_1`.
 
-    The folder is omitted for a file in the root, whose name differs between checkouts.
+    The name has the folder of the file, or all folders, without the root, whose name differs between checkouts.
     """
-    parent = path.parent.name if path.parent != config.rootpath else ""
-    return "/".join(re.sub(r"[^\w.+=,~-]+", "_", part) for part in (parent, path.stem) if part)
+    below = path.relative_to(config.rootpath) if path.is_relative_to(config.rootpath) else path
+    folders = below.parent.parts if all_folders else below.parent.parts[-1:]
+    return "/".join(re.sub(r"[^\w.+=,~-]+", "_", part) for part in (*folders, path.stem))
 
 
 def run_markers(

@@ -53,6 +53,25 @@ def test_success_rate_has_marker_slow(project: pytest.Pytester) -> None:
     assert items == ["near/drive[rate=0.9]"]
 
 
+def test_files_of_equal_folder_and_name_are_named_by_all_folders(project: pytest.Pytester) -> None:
+    """A further file does not rename the tests of the others."""
+    project.makepyfile(
+        """
+        import pytest
+
+        @pytest.mark.scenario("xosc/**/drive.xosc")
+        def test_drive(run_scenario):
+            run_scenario()
+        """
+    )
+    expected = {"test_drive[far/drive-seed=1]", "test_drive[xosc/near/drive-seed=1]"}
+    for town in ("a", "b", "0"):
+        shutil.copytree(project.path / "xosc" / "near", project.path / "xosc" / town / "near")
+        expected.add(f"test_drive[xosc/{town}/near/drive-seed=1]")
+        names = collected(project, "test_files_of_equal_folder_and_name_are_named_by_all_folders.py")
+        assert set(names) == expected
+
+
 def test_keyword_expression_selects_settings_of_python_tests(project: pytest.Pytester) -> None:
     project.makepyfile(
         """
