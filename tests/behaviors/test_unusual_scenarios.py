@@ -128,3 +128,16 @@ TO_ITSELF = {
 def test_distance_of_an_actor_to_itself_is_rejected_with_its_line(run: Run, action: str) -> None:
     with pytest.raises(InputError, match=r"scene\.xosc:\d+: .*the reference entity is the actor itself \(got 'Ego'"):
         run(1, ("Ego", private_xml(action)), driven=False)
+
+
+@pytest.mark.element("SynchronizeAction")
+@pytest.mark.parametrize("name", ["Ego", "Other"])
+def test_synchronize_with_a_target_that_moves_with_its_entity_is_rejected(run: Run, name: str) -> None:
+    targets = {entity: '<LanePosition roadId="1" laneId="-1" s="200"/>' for entity in ("Ego", "Other")}
+    targets[name] = f'<RelativeLanePosition entityRef="{name}" dLane="0" dsLane="50"/>'
+    action = (
+        f'<SynchronizeAction masterEntityRef="Other"><TargetPositionMaster>{targets["Other"]}</TargetPositionMaster>'
+        f"<TargetPosition>{targets['Ego']}</TargetPosition></SynchronizeAction>"
+    )
+    with pytest.raises(InputError, match=rf"scene\.xosc:\d+: .*the target position of '{name}' moves with it"):
+        run(2, ("Ego", private_xml(action)), driven=False, others={"Other": (-1, 100.0, 10.0)})

@@ -76,8 +76,12 @@ class SynchronizeAction(ActionBehaviour):
         """Trajectories along which the distances of both were measured last."""
         self._targets: dict[str, tuple[TrajectoryCurve, bool]] = {}
         """Per entity: its trajectory, and whether its target is a TrajectoryPosition on that trajectory."""
-        targets = self.action.target_position, self.action.target_position_master
-        self._moving = tuple(bool(referenced_entities(target)) for target in targets)
+        own, master = self.action.target_position, self.action.target_position_master
+        for name, target in ((self.actor.name, own), (self.action.master_entity_ref, master)):
+            if name in referenced_entities(target):
+                message = f"the target position of {name!r} moves with it, so that it is never reached"
+                raise self.error(message, "specify a position that does not refer to it")
+        self._moving = tuple(bool(referenced_entities(target)) for target in (own, master))
         """Whether each target moves with an entity."""
         self._sense: float | None = None
         """-1 if the actor drives backwards, else +1; None before the first step."""
