@@ -337,7 +337,7 @@ def passing_profiles(
         if moves:
             one_lane = math.isnan(beside.left) and math.isnan(beside.right)
             solid = any(lanes.has_solid_line for lanes in (beside, *obstacle.beside))
-            may_cross = not solid and obstacle.end < situation.junction - BEFORE_JUNCTION
+            may_cross = not solid and returns and obstacle.end < situation.junction - BEFORE_JUNCTION
             sides = (overtaking,) if one_lane else ()
         around = [_around(situation, scene, obstacle, side) for side in sides]
         profiles += [profile for profile in around if profile and (may_cross or not profile.uses_oncoming)]

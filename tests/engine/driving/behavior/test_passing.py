@@ -264,6 +264,22 @@ def test_moving_vehicle_is_not_overtaken_before_a_junction() -> None:
     assert max(abs(y) for _, y, _ in run.path) < 0.2
 
 
+def test_column_longer_than_the_rest_of_the_route_is_not_overtaken() -> None:
+    """The last truck hides three others, one every 14 m at 7 m/s. At 3 m/s more, the vehicle needs at least 50 m · 10 / 3
+    to pass them, and sees them 140 m before the end of its route."""
+    roads = two_lane_road(300.0)
+    run = PlannedDrive(behavior(roads), roads)
+    trucks = [KnownBox(60.0 + 14.0 * number, kind="truck", vx=7.0, size=(8.5, 2.5)) for number in range(4)]
+
+    def objects(now: float) -> list[KnownBox]:
+        seen = 4 if run.path and run.path[-1][1] > 0.5 else 1
+        return [truck._replace(x=truck.x + 7.0 * now) for truck in trucks[:seen]]
+
+    run.run(44.0, objects)
+    run.world.close()
+    assert run.path[-1] == (pytest.approx(300.0, abs=2.0), pytest.approx(LANE, abs=0.1), pytest.approx(0.0, abs=0.1))
+
+
 def test_cyclist_at_the_edge_of_the_lane_is_passed_before_a_junction() -> None:
     """The other lane, from y = 1.75 m on, is not needed: the car is 1.84 m wide."""
     roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
