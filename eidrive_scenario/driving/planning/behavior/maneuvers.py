@@ -345,14 +345,15 @@ def passing_profiles(
 
 
 def extended(situation: Situation, scene: Surroundings, profile: LateralProfile) -> LateralProfile:
-    """Return a profile past standing objects with its end behind those that have come into view behind them.
+    """Return a profile past standing objects with its end behind those that have come into view behind them, on the
+    route or in the way of the return to it.
 
     It is the same if there are none, if they need more clearance to its side, or if the vehicle returns already.
     """
     side, end = profile.side, profile.places[-2] if len(profile.places) > 2 else -math.inf
     if profile.last != 0.0 or situation.steered[0] >= end:
         return profile
-    blocker = _blocker(situation, scene)
+    blocker = _in_return(situation, scene, profile) or _blocker(situation, scene)
     if blocker is None or blocker.rear > end + TOGETHER:
         return profile
     obstacle = _obstacle(situation, scene, blocker)
@@ -366,6 +367,25 @@ def extended(situation: Situation, scene: Surroundings, profile: LateralProfile)
     back = _length_at(situation, obstacle.end, value, is_hasty=value > profile.border)
     places = (*profile.places[:-2], obstacle.end, obstacle.end + back)
     return msgspec.structs.replace(profile, places=places)
+
+
+def _in_return(situation: Situation, scene: Surroundings, profile: LateralProfile) -> Present | None:
+    """Return the first standing object beside the route that is in the way of the return of a profile to it; None if
+    there is none."""
+    *_, end, back = profile.places
+    beside = [
+        hypothesis
+        for hypothesis in scene.present
+        if hypothesis.front > end
+        and hypothesis.rear < back
+        and abs(hypothesis.speed) < WAITING
+        and not hypothesis.crosses
+        and not _is_in_way(situation, hypothesis)
+        and _is_passable(situation, hypothesis)
+        and abs(profile.offset_at(hypothesis.s) - hypothesis.d) - hypothesis.half_width
+        < situation.body.half_width + hypothesis.margin
+    ]
+    return min(beside, key=attrgetter("s"), default=None)
 
 
 def shortened(situation: Situation, scene: Surroundings, profile: LateralProfile) -> LateralProfile | None:

@@ -90,6 +90,20 @@ def test_pass_ends_behind_parked_cars_that_come_into_view() -> None:
     assert min(speed for place, _, speed in run.path if 80.0 < place < 112.0) > 3.0
 
 
+def test_vehicle_returns_behind_cones_between_the_lanes() -> None:
+    """Cones lead out of the lane, which is free behind them, and for 25 m on between the lanes, one every 5 m."""
+    closing = [KnownBox(80.0 + 4.0 * number, LANE * (2.0 - number / 4.0)) for number in range(8)]
+    between = [KnownBox(112.0 + 5.0 * number, 0.0) for number in range(6)]
+    cones = [cone._replace(kind="misc", size=(0.4, 0.4)) for cone in (*closing, *between)]
+    roads = two_lane_road()
+    run = PlannedDrive(behavior(roads), roads)
+    run.run(28.0, lambda now: cones)
+    run.world.close()
+    assert run.front > 160.0
+    assert run.path[-1][1] == pytest.approx(LANE, abs=0.1)
+    assert min(run.least_distance(cone) for cone in cones) > 0.4
+
+
 @pytest.mark.parametrize("gap", [20.0, 25.0])
 def test_vehicle_returns_before_a_pedestrian_behind_the_passed_truck(gap: float) -> None:
     """When the vehicle leaves its lane, the pedestrian and a car 112 m ahead come into view. Beside
@@ -265,8 +279,8 @@ def test_moving_vehicle_is_not_overtaken_before_a_junction() -> None:
 
 
 def test_column_longer_than_the_rest_of_the_route_is_not_overtaken() -> None:
-    """The last truck hides three others, one every 14 m at 7 m/s. At 3 m/s more, the vehicle needs at least 50 m · 10 / 3
-    to pass them, and sees them 140 m before the end of its route."""
+    """The last truck hides three others, one every 14 m at 7 m/s. At 3 m/s more, the vehicle needs at least 50 · 10 / 3
+    m to pass them, and sees them 140 m before the end of its route."""
     roads = two_lane_road(300.0)
     run = PlannedDrive(behavior(roads), roads)
     trucks = [KnownBox(60.0 + 14.0 * number, kind="truck", vx=7.0, size=(8.5, 2.5)) for number in range(4)]
