@@ -317,8 +317,10 @@ def passing_profiles(
     obstacle = _obstacle(situation, scene, blocker)
     beside = situation.lanes_ahead
     faster, overtaking = beside.faster, beside.overtaking
+    # The vehicle does not stop at the end of its route in the lane of the opposite direction.
+    may_cross = obstacle is not None and obstacle.end < situation.end
     if not _is_parked(situation, blocker):
-        profile = None if obstacle is None else _around(situation, scene, obstacle, overtaking)
+        profile = None if obstacle is None or not may_cross else _around(situation, scene, obstacle, overtaking)
         return profiles if profile is None or not profile.uses_oncoming else [*profiles, profile]
     moves = obstacle is not None and obstacle.fastest > ONCOMING_SPEED
     # The vehicle has to return to its lane before the end of its route, and before the next change of the route.
@@ -333,7 +335,6 @@ def passing_profiles(
         # A moving vehicle is overtaken on one side only. With several lanes of its direction that is a change of lane:
         # those of the opposite direction are not for overtaking then (section 7 of the German road traffic rules).
         sides: tuple[int, ...] = (overtaking, -overtaking)
-        may_cross = True
         if moves:
             one_lane = math.isnan(beside.left) and math.isnan(beside.right)
             solid = any(lanes.has_solid_line for lanes in (beside, *obstacle.beside))

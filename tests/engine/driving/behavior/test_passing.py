@@ -294,6 +294,18 @@ def test_column_longer_than_the_rest_of_the_route_is_not_overtaken() -> None:
     assert run.path[-1] == (pytest.approx(300.0, abs=2.0), pytest.approx(LANE, abs=0.1), pytest.approx(0.0, abs=0.1))
 
 
+@pytest.mark.parametrize("place", [196.0, 204.0])
+def test_vehicle_waits_in_its_lane_behind_a_car_at_the_end_of_its_route(place: float) -> None:
+    """The route ends at x = 200 m, before the vehicle could return from the other lane; it stands until the end."""
+    roads = two_lane_road(200.0)
+    run = PlannedDrive(behavior(roads), roads, start=120.0)
+    run.run(28.0, lambda now: [KnownBox(place)])
+    run.world.close()
+    assert max(y for _, y, _ in run.path) + CAR.size[1] / 2.0 < 0.0
+    assert run.front < place - 2.25
+    assert max(run.speeds[-200:]) < 0.01
+
+
 def test_cyclist_at_the_edge_of_the_lane_is_passed_before_a_junction() -> None:
     """The other lane, from y = 1.75 m on, is not needed: the car is 1.84 m wide."""
     roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
