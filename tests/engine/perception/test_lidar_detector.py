@@ -399,7 +399,7 @@ def test_level_frame_to_local_inverts_to_world() -> None:
 def test_pairs_of_objects_are_compared_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of 30 cars, 8 are in two parts: with the merged ones 46 objects. The boxes of these parts are compared twice."""
 
-    def box(number: int) -> tuple[float, ...]:
+    def box(number: int) -> tuple[float, float, float, float, float, float, float]:
         column, line = number % 30 % 6, number % 30 // 6
         return 12.0 * column + (number >= 30), 8.0 * line, 0.75, 3.0 if number >= 30 else 4.0, 1.8, 1.5, 0.0
 
