@@ -93,9 +93,7 @@ def test_fuse_prefers_the_velocity_of_a_settled_track(report: Make, fuse: Fuse) 
 
 
 @pytest.mark.parametrize(("variance", "lifetime"), [(0.0, REPORT_LIFETIME), (16.0, 1.168), (144.0, 0.415)])
-def test_tracks_of_uncertain_velocity_end_early(
-    variance: float, lifetime: float, report: Make, fuse: Fuse
-) -> None:
+def test_tracks_of_uncertain_velocity_end_early(variance: float, lifetime: float, report: Make, fuse: Fuse) -> None:
     """5 m in 2.28 s for a known velocity. v² t² + 2 t³ = 25 m² has the roots 1.168 s and 0.415 s for 4 and 12 m/s."""
     given = tracked(report("A", 0.0, [(0.0, 0.0)], velocity=(0.0, 0.0), tracks=(1,), complete=False), variance)
     assert [len(fuse([given], lifetime + late)) for late in (-0.01, 0.01)] == [1, 0]
