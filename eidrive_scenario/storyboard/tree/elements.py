@@ -83,16 +83,16 @@ class StoryElement(Composite):
             for element in self.elements:
                 element.list_active(awaited, actions)
 
-    def evaluate_stop_trigger(self) -> None:
-        """Stop the running element if its trigger fires, which is evaluated from the tick after the start on.
+    def is_stop_triggered(self) -> bool:
+        """Whether the element runs and its stop trigger fires, which is evaluated from the tick after the start on.
 
         That of the storyboard is evaluated from the first tick on.
         """
-        stop = self.stop_leaf
-        if stop is not None and self.record.state is ElementState.RUNNING and not self._is_tried and stop.is_fired():
-            self.stop_element(stop.trigger.why)
+        if self.stop_leaf is None or self.record.state is not ElementState.RUNNING or self._is_tried:
+            return False
+        return self.stop_leaf.is_fired()
 
-    def is_triggered(self) -> bool:
+    def is_start_triggered(self) -> bool:
         """Whether the element waits and its start trigger fires, or it has none."""
         if self.record.state is not ElementState.STANDBY or self._is_tried:
             return False
@@ -102,6 +102,11 @@ class StoryElement(Composite):
     def start_reason(self) -> str:
         """Reason for the start after its trigger fired."""
         return NO_TRIGGER if self.start_leaf is None else self.start_leaf.trigger.why
+
+    @property
+    def stop_reason(self) -> str:
+        """Reason for the stop after its trigger fired."""
+        return "" if self.stop_leaf is None else self.stop_leaf.trigger.why
 
     @property
     def _is_tried(self) -> bool:
@@ -203,16 +208,18 @@ class StoryboardElement(StoryElement):
                 self.list_active(awaited, actions)
                 self._awaited, self._running_actions = awaited, actions
             version = progress.version
-            self._evaluate_triggers(
-                [
-                    element
-                    for element, trigger in self._awaited
-                    if trigger.version < version or trigger.rests_until <= time or not moved.isdisjoint(trigger.reads)
-                ]
-            )
-            moved, time = set(), -math.inf  # Motion and time are constant within a tick.
+            due = [
+                element
+                for element, trigger in self._awaited
+                if trigger.version < version or trigger.rests_until <= time or not moved.isdisjoint(trigger.reads)
+            ]
+            has_stopped = self._stop_elements(due)
             if self.state is not ElementState.RUNNING:
                 return
+            if has_stopped:
+                continue  # Elements start once no further one stops.
+            self._start_elements(due)
+            moved, time = set(), math.nan  # Motion and time are constant within a tick.
             if init is not None:
                 init.tick_once()
                 init = None
@@ -222,18 +229,23 @@ class StoryboardElement(StoryElement):
                 for abort in pending:
                     abort()
 
-    def _evaluate_triggers(self, elements: Sequence[StoryElement]) -> None:
-        """Evaluate the triggers of these elements, and those of the children of elements that start.
+    def _stop_elements(self, elements: Sequence[StoryElement]) -> bool:
+        """Stop elements by their triggers, which are evaluated together before; return whether one stops."""
+        stopping = [element for element in elements if element.is_stop_triggered()]
+        for element in stopping:
+            if element.record.state is ElementState.RUNNING:  # otherwise it has stopped with its parent
+                element.stop_element(element.stop_reason)
+        return bool(stopping)
 
-        Elements stop before others start. A trigger is evaluated before elements of its level start, and before events
-        start, so that it observes these starts as changes, independently of the order in the file. Events start in this
-        order.
+    def _start_elements(self, elements: Sequence[StoryElement]) -> None:
+        """Start elements, and children of those that start, by their triggers.
+
+        A trigger is evaluated before elements of its level start, and before events start, so that it observes these
+        starts as changes, independently of the order in the file. Events start in this order.
         """
-        for element in elements:
-            element.evaluate_stop_trigger()
         events: list[StoryElement] = []
         while elements:
-            triggered = [element for element in elements if element.is_triggered()]
+            triggered = [element for element in elements if element.is_start_triggered()]
             events += [element for element in triggered if element.kind == "event"]
             parents = [element for element in triggered if element.kind != "event"]
             for element in parents:

@@ -113,6 +113,36 @@ def test_start_with_parent_is_observed_as_edge_in_any_order(
     ]
 
 
+@pytest.mark.element("StoryboardElementStateCondition", "edge falling")
+def test_transition_before_the_first_evaluation_is_over_in_the_next_step(build: Any) -> None:
+    """The start of the act is observed in its step, so that it becomes false in the next one."""
+    over = element_state_xml("act", "act", "startTransition")
+    ticks = course(build(PLACE, event("after", when(over, edge="falling")) + event("other", when(time_xml(9)))), 3)
+    assert [entry[0] for entry in ticks if entry] == ["storyboard starts", "after starts"]
+    assert ticks[1][0] == "after starts"
+
+
+@pytest.mark.element("Act StopTrigger")
+@pytest.mark.parametrize("order", [list, reversed])
+def test_stop_of_an_act_is_observed_by_another_stop_trigger(build: Any, order: Any) -> None:
+    """Stop triggers are evaluated from the step after the start on, in which the first act stops."""
+    whats = {"first": time_xml(0.05), "second": element_state_xml("act", "first", "completeState")}
+    acts = [
+        act_xml(
+            group_xml(maneuver_xml(event("waits", when(time_xml(9)))), "A"),
+            trigger_xml(group(what, edge="none" if name == "first" else "rising"), kind="StopTrigger"),
+            name=name,
+        )
+        for name, what in whats.items()
+    ]
+    storyboard = build(PLACE, story=acts_xml(*order(acts)))
+    storyboard.initial()
+    for tick in (0, 1):
+        storyboard.tick(replace(storyboard.context.view, time=tick * 0.1, tick=tick))
+    stopped = [c.element for c in storyboard.changes if c.kind == "act" and c.transition is ElementTransition.STOP]
+    assert stopped == ["first", "second"]
+
+
 @pytest.mark.element("StoryboardElementStateCondition")
 def test_events_of_one_instant_start_though_one_changes_the_value_of_another(build: Any) -> None:
     writer = event("writer", when(time_xml(0.05)), action=SET.format(value="7"))
