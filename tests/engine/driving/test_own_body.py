@@ -175,10 +175,10 @@ def test_objects_far_from_all_places_of_the_body_are_kept(car: ActorSpec) -> Non
 @pytest.mark.parametrize(("height", "left"), [(2.5, []), (6.5, [(0.2, 0.0)])])
 def test_car_below_or_on_a_bridge_is_not_the_body(car: ActorSpec, height: float, left: list[Place]) -> None:
     """Errors of the height of a box by 2.5 m do not keep the body."""
-    found = seen((0.2, 0.0))
-    found.boxes[:, 2] += height
-    assert kept(body(car), found) == left
-    assert body(car).without(found).boxes[:, :2].tolist() == [list(place) for place in left]
+    objects = seen((0.2, 0.0))
+    objects.boxes[:, 2] += height
+    assert kept(body(car), objects) == left
+    assert body(car).without(objects).boxes[:, :2].tolist() == [list(place) for place in left]
 
 
 def test_former_places_of_the_body_are_not_held_under_old_ids(car: ActorSpec) -> None:

@@ -63,15 +63,15 @@ def test_coasting_track_out_of_view_keeps_existence_until_coast_ends(kind: str) 
     """
     track = tracker(kind, coast=0.5)
     for tick in range(21):
-        found = track.update(cars(tick * DT, (tick * 1.0, 0.0)))
-    assert found.scores.tolist() == pytest.approx([0.8], abs=1e-4)
+        confirmed = track.update(cars(tick * DT, (tick * 1.0, 0.0)))
+    assert confirmed.scores.tolist() == pytest.approx([0.8], abs=1e-4)
     places, spread, existence = [], [], []
     for tick in range(21, 26):
-        found = track.update(cars(tick * DT), lambda boxes: np.zeros(len(boxes)))
-        existence.append(float(found.existence[0]))
-        places.append(float(found.boxes[0, 0]))
-        spread.append(float(found.covariance[0, 0, 0]))
-        assert found.scores[0] == pytest.approx(0.8 * found.existence[0])
+        confirmed = track.update(cars(tick * DT), lambda boxes: np.zeros(len(boxes)))
+        existence.append(float(confirmed.existence[0]))
+        places.append(float(confirmed.boxes[0, 0]))
+        spread.append(float(confirmed.covariance[0, 0, 0]))
+        assert confirmed.scores[0] == pytest.approx(0.8 * confirmed.existence[0])
     np.testing.assert_allclose(places, [21, 22, 23, 24, 25], atol=0.3)
     np.testing.assert_allclose(existence, np.exp(-0.01 * np.arange(1, 6)), atol=1e-4)
     assert spread == sorted(spread)
@@ -117,8 +117,10 @@ def test_only_scans_that_can_show_an_object_count_for_confirmation(every: int, r
     track, first = tracker(), None
     for tick in range(60):
         shows = tick % every == 0
-        found = track.update(cars(tick * 0.05, *([(20, 0)] if shows else [])), partial(constant_share, float(shows)))
-        first = tick * 0.05 if len(found) and first is None else first
+        confirmed = track.update(
+            cars(tick * 0.05, *([(20, 0)] if shows else [])), partial(constant_share, float(shows))
+        )
+        first = tick * 0.05 if len(confirmed) and first is None else first
     assert first == (reported and pytest.approx(reported))
 
 
@@ -155,9 +157,9 @@ def test_track_numbers_persist_when_objects_pass() -> None:
     side_of: dict[int, float] = {}
     for tick in range(60):
         east, west = (-15.0 + tick * 0.5, 0.0), (15.0 - tick * 0.5, 3.0)
-        found = track.update(cars(tick * DT, *((east, west) if tick % 2 else (west, east))))
+        confirmed = track.update(cars(tick * DT, *((east, west) if tick % 2 else (west, east))))
         if tick > 2:
-            sides = dict(zip(found.tracks, found.boxes[:, 1].tolist(), strict=True))
+            sides = dict(zip(confirmed.tracks, confirmed.boxes[:, 1].tolist(), strict=True))
             side_of = side_of or sides
             assert sides == {number: pytest.approx(side, abs=0.5) for number, side in side_of.items()}
     assert len(side_of) == 2
@@ -167,9 +169,9 @@ def test_association_minimizes_total_cost() -> None:
     """Tracks at 0 and 2.4, boxes at 2.2 and 4.0: greedy assignment would pair (2.4, 2.2) and leave (0, 4.0)."""
     track = tracker(confirm=(1, 1))
     track.update(cars(0.0, (0.0, 0.0), (2.4, 0.0), deviation=1.0))
-    found = track.update(cars(DT, (4.0, 0.0), (2.2, 0.0), deviation=1.0))
-    assert sorted(found.tracks) == [1, 2]
-    assert dict(zip(found.tracks, (found.boxes[:, 0] > 2.3).tolist(), strict=True)) == {1: False, 2: True}
+    confirmed = track.update(cars(DT, (4.0, 0.0), (2.2, 0.0), deviation=1.0))
+    assert sorted(confirmed.tracks) == [1, 2]
+    assert dict(zip(confirmed.tracks, (confirmed.boxes[:, 0] > 2.3).tolist(), strict=True)) == {1: False, 2: True}
 
 
 def test_box_outside_gate_initiates_track() -> None:
@@ -190,11 +192,11 @@ def test_velocity_and_heading_are_estimated_from_motion(kind: str) -> None:
         angle = 0.4 * tick * DT
         place = 20.0 * math.cos(angle) + rng.normal(0, 0.1), 20.0 * math.sin(angle) + rng.normal(0, 0.1)
         yaw = angle + math.pi / 2 + math.pi * int(rng.integers(2)) + rng.normal(0, 0.03)
-        found = track.update(cars(tick * DT, (*place, yaw)))
+        confirmed = track.update(cars(tick * DT, (*place, yaw)))
         if tick > 20:
             true = 8.0 * np.array([-math.sin(angle), math.cos(angle)])
-            errors.append(float(np.linalg.norm(found.velocity[0] - true)))
-            off = float(found.boxes[0, 6]) - angle - math.pi / 2
+            errors.append(float(np.linalg.norm(confirmed.velocity[0] - true)))
+            off = float(confirmed.boxes[0, 6]) - angle - math.pi / 2
             headings.append(abs(math.remainder(off, 2 * math.pi)))
     assert np.mean(errors) < {"cv": 1.2, "ctrv": 0.8}[kind]
     assert max(headings) < 0.25
@@ -207,9 +209,9 @@ def test_box_across_a_track_hardly_moves_it() -> None:
         track.update(cars(tick * DT, (2.0 * tick * DT, 0.0, 0.0)))
         alike.update(cars(tick * DT, (2.0 * tick * DT, 0.0, 0.0)))
     moved = alike.update(cars(3.0, (6.0, -0.4, 0.0))).boxes[0, 1]
-    found = track.update(cars(3.0, (6.0, -0.4, math.pi / 2)))
-    assert abs(found.boxes[0, 1]) < 0.1 * abs(moved)
-    assert found.boxes[0, 6] == pytest.approx(0.0, abs=1e-6)
+    confirmed = track.update(cars(3.0, (6.0, -0.4, math.pi / 2)))
+    assert abs(confirmed.boxes[0, 1]) < 0.1 * abs(moved)
+    assert confirmed.boxes[0, 6] == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("yaw", [0.0, math.pi / 3.0, -2.5])
@@ -225,12 +227,12 @@ def test_box_around_a_part_of_a_track_hardly_moves_it(yaw: float) -> None:
     part = cars(3.0, (*place, yaw))
     boxes = part.boxes.copy()
     boxes[:, 3:6] = 0.55, 0.55, 1.72
-    found = track.update(replace(part, boxes=boxes, classes=("pedestrian",)))
+    confirmed = track.update(replace(part, boxes=boxes, classes=("pedestrian",)))
     moved = np.abs((whole.boxes[0, :2] - 6.0 * ahead) @ np.column_stack([ahead, left]))
-    after = np.abs((found.boxes[0, :2] - 6.0 * ahead) @ np.column_stack([ahead, left]))
+    after = np.abs((confirmed.boxes[0, :2] - 6.0 * ahead) @ np.column_stack([ahead, left]))
     assert after[0] < 0.1 * moved[0]
     assert after[1] < 0.2 * moved[1]
-    np.testing.assert_allclose(found.boxes[0, 3:5], whole.boxes[0, 3:5])
+    np.testing.assert_allclose(confirmed.boxes[0, 3:5], whole.boxes[0, 3:5])
 
 
 def test_ctrv_has_smaller_error_than_cv_in_curve() -> None:
@@ -240,12 +242,12 @@ def test_ctrv_has_smaller_error_than_cv_in_curve() -> None:
         track, errors = tracker(kind), []
         for tick in range(60):
             angle = 0.4 * tick * 0.5
-            found = track.update(
+            confirmed = track.update(
                 cars(tick * 0.5, (20 * math.cos(angle), 20 * math.sin(angle), angle + math.pi / 2), deviation=0.3)
             )
             if tick > 10:
                 place = np.array([20 * math.cos(angle), 20 * math.sin(angle)])
-                errors.append(float(np.linalg.norm(found.boxes[0, :2] - place)))
+                errors.append(float(np.linalg.norm(confirmed.boxes[0, :2] - place)))
         means[kind] = np.mean(errors)
     assert means["ctrv"] < 0.7 * means["cv"]
 
@@ -267,9 +269,9 @@ def test_track_nees_is_within_chi_square_bounds(kind: str) -> None:
         track = tracker(kind, confirm=(1, 1), gate=0.999999)
         for tick in range(ticks):
             measured = (x + rng.normal(0, deviation), y + rng.normal(0, deviation), heading + rng.normal(0, 0.1))
-            found = track.update(cars(tick * DT, measured, deviation=deviation))
-            off = found.boxes[0, :2] - (x, y)
-            nees[tick] += off @ np.linalg.solve(found.covariance[0], off) / runs
+            confirmed = track.update(cars(tick * DT, measured, deviation=deviation))
+            off = confirmed.boxes[0, :2] - (x, y)
+            nees[tick] += off @ np.linalg.solve(confirmed.covariance[0], off) / runs
             for _ in range(10):
                 small = DT / 10
                 if kind == "cv":
@@ -291,8 +293,8 @@ def test_track_class_has_largest_sum_of_scores() -> None:
     track = tracker()
     expected = ("car", "truck", "car", "car", "truck", "car")
     for tick, name in zip(count(), expected, strict=False):
-        found = track.update(cars(tick * DT, (0.0, 0.0), names=(name,)))
-    assert found.classes == ("car",)
+        confirmed = track.update(cars(tick * DT, (0.0, 0.0), names=(name,)))
+    assert confirmed.classes == ("car",)
 
 
 def test_tracks_of_mirrored_scene_are_mirrored() -> None:
@@ -309,8 +311,8 @@ def test_tracks_of_mirrored_scene_are_mirrored() -> None:
 def test_detections_without_covariance_are_tracked() -> None:
     track = tracker()
     for tick in range(5):
-        found = cars(tick * DT, (tick * 1.0, 0.0))
-        tracked = track.update(replace(found, covariance=np.full((1, 2, 2), np.nan)))
+        detections = cars(tick * DT, (tick * 1.0, 0.0))
+        tracked = track.update(replace(detections, covariance=np.full((1, 2, 2), np.nan)))
     assert np.isfinite(tracked.covariance).all()
     assert float(tracked.velocity[0, 0]) == pytest.approx(10.0, abs=1.0)
 
@@ -427,16 +429,16 @@ def test_variance_of_velocity_covers_the_error_of_a_new_track(kind: str) -> None
     within three standard deviations. One at rest is known to 0.5 m/s after three seconds."""
     track, suppressed = tracker(kind), 0
     for scan in range(6):
-        found = track.update(cars(DT * scan, (scan * 1.0, 0.0), deviation=0.5))
-        for velocity, variance in zip(found.velocity, found.velocity_variance, strict=True):
+        confirmed = track.update(cars(DT * scan, (scan * 1.0, 0.0), deviation=0.5))
+        for velocity, variance in zip(confirmed.velocity, confirmed.velocity_variance, strict=True):
             error = math.dist(velocity, (10.0, 0.0))
             assert error < 3.0 * math.sqrt(variance)
             suppressed += error > 9.0
     assert suppressed
     track = tracker(kind)
     for scan in range(30):
-        found = track.update(cars(DT * scan, (0.0, 0.0), deviation=0.5))
-    assert found.velocity_variance[0] < 0.25
+        confirmed = track.update(cars(DT * scan, (0.0, 0.0), deviation=0.5))
+    assert confirmed.velocity_variance[0] < 0.25
 
 
 @pytest.mark.parametrize("yaw", [0.0, math.pi / 2.0])

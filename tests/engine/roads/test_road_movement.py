@@ -331,8 +331,8 @@ def test_distance_enters_a_road_at_the_nearer_end(s: float, expected: float, ori
 def test_distance_between_neighboring_roads_searches_no_others(monkeypatch: pytest.MonkeyPatch) -> None:
     """A row of 100 roads: from 1 m before the end of road 50 to 1 m after the start of the next one."""
     links = [successor_xml("1"), *(predecessor_xml(f"{n - 1}") + successor_xml(f"{n + 1}") for n in range(1, 99))]
-    row = [road_xml(f"{n}", x=100.0 * n, link=link) for n, link in enumerate(links)]
-    network = RoadNetwork.parse(map_xml(*row, road_xml("99", x=9900.0, link=predecessor_xml("98"))))
+    roads = [road_xml(f"{n}", x=100.0 * n, link=link) for n, link in enumerate(links)]
+    network = RoadNetwork.parse(map_xml(*roads, road_xml("99", x=9900.0, link=predecessor_xml("98"))))
     visited: list[str] = []
     beyond_road = network.links.beyond_road
 
