@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import components, segment_distance
 from eidrive_scenario.roads import OTHER_LEVEL, LaneKey, RoadNetwork, Signal
 from eidrive_scenario.roads.model.road_map import SignalPlace
 from eidrive_scenario.roads.model.signal_states import lamp_colors, must_stop, shows_red
@@ -20,6 +21,8 @@ ON_PATH = 1.75
 """Maximum distance between a path and the lane center at the stop line of the lane [m]."""
 AS_NEAR = 0.5
 """Maximum difference of the distances of the end of a path from two connecting roads that may be on any of them [m]."""
+WAY_POINTS = 4
+"""Number of points of the way from the start of a connecting road to its middle."""
 NEAR_SIDE = 10.0
 """Maximum distance of a light from the entry of its junction, along and across, at which it stands before it [m]."""
 SAME_WAY = math.cos(math.radians(45.0))
@@ -29,8 +32,8 @@ class StopLine(NamedTuple):
     """Position at which a signal stops the traffic of one lane.
 
     x, y, z   on the center of the lane [m];  heading  of its traffic [rad]
-    beyond    a point that only the routes with this signal pass, unless they end before it; None if the line alone
-              determines them
+    way       points from the start of a connecting road to its middle, which only the routes with this signal pass,
+              unless they end before it; empty if the line alone determines them
     """
 
     signal: str
@@ -39,7 +42,12 @@ class StopLine(NamedTuple):
     y: float
     z: float
     heading: float
-    beyond: tuple[float, float] | None
+    way: tuple[tuple[float, float], ...]
+
+    @property
+    def beyond(self) -> tuple[float, float] | None:
+        """Last point of the way, None without one."""
+        return self.way[-1] if self.way else None
 
 
 class SignalAhead(NamedTuple):
@@ -116,27 +124,28 @@ def _lines(roads: RoadNetwork, signal: Signal, kind: Kind, place: SignalPlace) -
         return
     for number in roads.signal_lanes(place):
         direction = roads.driving_direction(road.id, number)
+        way: tuple[tuple[float, float], ...] = ()
         if road.junction_id is None:
-            beyond = None
             pose = roads.lane_pose_at(road.id, number, place.s)
         else:
             section = road.section_at(place.s)
-            middle = roads.lane_pose_at(road.id, number, (section.s + section.end) / 2.0)
-            beyond = (middle.x, middle.y)
+            begin, middle = section.s if direction > 0 else section.end, (section.s + section.end) / 2.0
+            along = roads.lane_pose(road.id, number, np.linspace(begin, middle, WAY_POINTS + 1)[1:])
+            way = tuple(zip(along.x.tolist(), along.y.tolist(), strict=True))
             entry = roads.entry_lane(LaneKey(road.id, section.index, number))
             if entry is None:
                 continue
             pose = roads.lane_pose_at(road.id, entry.lane, 0.0 if direction > 0 else road.length)
         heading = pose.h + (0.0 if direction > 0 else math.pi)
         back = 0.0
-        if beyond is not None:  # a light may stand before the entry of the junction
+        if way:  # a light may stand before the entry of the junction
             light = roads.signal_pose(signal)
             dx, dy = light.x - pose.x, light.y - pose.y
             before = -dx * math.cos(heading) - dy * math.sin(heading)
             aside = abs(dy * math.cos(heading) - dx * math.sin(heading))
             back = before if 0.0 < before < NEAR_SIDE and aside < NEAR_SIDE else 0.0
         x, y = pose.x - back * math.cos(heading), pose.y - back * math.sin(heading)
-        yield StopLine(signal.id, kind, x, y, pose.z, heading, beyond)
+        yield StopLine(signal.id, kind, x, y, pose.z, heading, way)
 
 
 def places_along(
@@ -170,19 +179,12 @@ def places_along(
 
 
 def _distance_at_end(path: Array, line: StopLine) -> float:
-    """Return the distance of the end of a path (M, 2) from the way between a stop line and its point `beyond` [m].
-
-    The way is a parabola along the heading at the line, a bend of up to a quarter turn. The distance is inf at an end
-    that is not between them.
-    """
-    if line.beyond is None:
+    """Return the distance of the end of a path (M, 2) from the way of a stop line [m]; inf if it ends before the line
+    or the line has no way."""
+    x, y = path[-1].tolist()
+    if not line.way or components(x - line.x, y - line.y, line.heading)[0] <= 0.0:
         return math.inf
-    cos, sin = math.cos(line.heading), math.sin(line.heading)
-    (ahead, left), (ahead_beyond, left_beyond) = (
-        (cos * (x - line.x) + sin * (y - line.y), cos * (y - line.y) - sin * (x - line.x))
-        for x, y in (path[-1].tolist(), line.beyond)
-    )
-    return abs(left - left_beyond * (ahead / ahead_beyond) ** 2) if 0.0 < ahead <= ahead_beyond else math.inf
+    return min(segment_distance(x, y, *a, *b) for a, b in pairwise([(line.x, line.y), *line.way]))
 
 
 def _passes(path: Array, step: Array, length: Array, x: float, y: float) -> Iterator[tuple[int, float]]:
