@@ -285,6 +285,15 @@ def segment_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: fl
     return math.hypot(x - x0 - share * dx, y - y0 - share * dy)
 
 
+def aligned_distances(points: Array, x: float, y: float, heading: float) -> Array:
+    """Return the distances (M - 1,) of a position from the points (M, D) of a line without the last one [m].
+
+    They are inf where the line does not lead along a heading [rad].
+    """
+    along = np.diff(points[:, :2], axis=0) @ (math.cos(heading), math.sin(heading)) > 0.0
+    return np.where(along, np.hypot(*(points[:-1, :2] - (x, y)).T), np.inf)
+
+
 def distances_along(points: Array) -> Array:
     """Return the distances of the points (M, 2) of a polyline from its first point, along it (M,) [m]."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])

@@ -12,9 +12,13 @@ from typing import TypeAlias
 import msgspec
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import aligned_distances
 
 LONGEST_WAY = 200_000.0
 """Maximum length of a way to a destination [m]: a planner may have a point for each meter."""
+ASTRAY = 10.0
+"""Distance from a route above which a vehicle was teleported off it, or left it by another action [m]: more than
+maneuvers beside the route require, as overtaking in the next lanes."""
 
 
 class Goal(msgspec.Struct, frozen=True):
@@ -39,6 +43,11 @@ class Goal(msgspec.Struct, frozen=True):
     def follows_route(self) -> bool:
         """Whether the way is a route: that of the path, or the one that the agent plans."""
         return self.is_route or (self.path is None and self.waypoints is not None)
+
+    def leads_along(self, x: float, y: float, heading: float) -> bool:
+        """Return whether the path or the lap leads along a heading [rad] within ASTRAY of a position [m]."""
+        lines = [line for line in (self.path, self.lap) if line is not None]
+        return any((aligned_distances(line, x, y, heading) <= ASTRAY).any() for line in lines)
 
 
 @dataclass(frozen=True)

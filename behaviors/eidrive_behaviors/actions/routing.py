@@ -25,14 +25,12 @@ from eidrive_scenario.api.actions import (
     target_lane,
     uniform_branch_selector,
 )
-from eidrive_scenario.api.common import Array, EidriveError, LaneLocation, RoadNetwork, Route, RouteError, generator
+from eidrive_scenario.api.common import EidriveError, LaneLocation, RoadNetwork, Route, RouteError, generator
 
 POINTS_APART = 2.0
 """Maximum spacing of the points of a path that is handed to a controller [m]."""
 RANDOM_ROUTE_LENGTH = 5000.0
 """Length of a random route for a vehicle with an active controller [m]."""
-ON_ROUTE = 10.0
-"""Maximum distance from a route at which a vehicle that is teleported continues along it [m]."""
 
 
 class AssignRouteAction(ActionBehaviour):
@@ -228,7 +226,8 @@ def resume_route(behaviour: ActionBehaviour, place: ResolvedPosition) -> None:
     goal, route = actor.goal, actor.motion.route
     if roads is None or place.location is None or not actor.driven or goal is None or not goal.is_route:
         return
-    if route is None or any(_leads_along(line, place) for line in (goal.path, goal.lap) if line is not None):
+    x, y, _, heading, *_ = place.pose
+    if route is None or goal.leads_along(x, y, heading):
         return
     try:
         way = roads.route(place.location, route.end)
@@ -239,14 +238,6 @@ def resume_route(behaviour: ActionBehaviour, place: ResolvedPosition) -> None:
         actor.set_goal(replace(goal, path=None, lap=None, is_route=False))
     else:
         assign_route(behaviour, dataclasses.replace(way, lap=route.onward))
-
-
-def _leads_along(line: Array, place: ResolvedPosition) -> bool:
-    """Return whether a line of points (M, 3) leads along the heading of a position next to it."""
-    x, y, _, heading, *_ = place.pose
-    away = np.hypot(*(line[:-1, :2] - (x, y)).T)
-    along = np.diff(line[:, :2], axis=0) @ (math.cos(heading), math.sin(heading)) > 0.0
-    return bool((along & (away <= ON_ROUTE)).any())
 
 
 def describe_position(position: model.Position) -> str:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.base.geometry import distances_along, segment_distance
+from eidrive_scenario.base.geometry import aligned_distances, distances_along, segment_distance
 from eidrive_scenario.roads import OTHER_LEVEL, RoadNetwork
 
 SPACING = 1.0
@@ -86,9 +86,8 @@ class PlannedPath:
 
     def nearest(self, x: float, y: float, yaw: float) -> int:
         """Return the index of the nearest point of the whole path; points where it leads along `yaw` have priority."""
-        away = np.hypot(*(self.points[:-1] - (x, y)).T)
-        along = np.diff(self.points, axis=0) @ (math.cos(yaw), math.sin(yaw)) > 0.0
-        return int(np.argmin(np.where(along, away, np.inf) if along.any() else away))
+        away = aligned_distances(self.points, x, y, yaw)
+        return int(np.argmin(away if np.isfinite(away).any() else np.hypot(*(self.points[:-1] - (x, y)).T)))
 
     def distance(self, x: float, y: float, index: int) -> float:
         """Return the distance of a point from the segment at an index [m]."""

@@ -13,7 +13,7 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.coverage import PerceptionRegion, ViewSector
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.geometry import distances_along
-from eidrive_scenario.base.requests import LONGEST_WAY, Goal
+from eidrive_scenario.base.requests import ASTRAY, LONGEST_WAY, Goal
 from eidrive_scenario.driving.planner_settings import PlannerSettings
 from eidrive_scenario.driving.planning.path import (
     SPACING,
@@ -83,9 +83,6 @@ TURNS = 50.0
 """Maximum length of a road that may lead into itself within a stride [m]."""
 BEYOND = 100.0
 """Distance beyond the end of the road within which a vehicle still stops for it [m]; farther away it was teleported."""
-ASTRAY = 10.0
-"""Distance from a route above which the vehicle was teleported, or left the route by another action, and its place on
-the route is searched again [m]: more than maneuvers beside the route require, as overtaking in the next lanes."""
 BEHIND = 5
 """Number of points behind the vehicle that are kept when the path is extended."""
 
