@@ -80,10 +80,16 @@ class Detections(msgspec.Struct, frozen=True, gc=False):
 
     @classmethod
     def concatenate(cls, time: float, parts: Sequence[Detections]) -> Detections:
-        """Return the objects of all parts as those of `time` [s]; the parts have the same kind of velocities."""
+        """Return the objects of all parts as those of `time` [s]; the parts have the same deviation of velocities.
+
+        Where only some of them state variances of velocities, those of the others are 0, which fusion raises to usual
+        ones.
+        """
         if not parts:
             return cls(time)
         is_estimated = any(len(part.existence) for part in parts)
+        variances = [part.velocity_variance if len(part.velocity_variance) else np.zeros(len(part)) for part in parts]
+        has_variances = any(len(part.velocity_variance) for part in parts)
         return cls(
             time,
             np.concatenate([part.boxes for part in parts]),
@@ -94,7 +100,7 @@ class Detections(msgspec.Struct, frozen=True, gc=False):
             tuple([number for part in parts for number in part.tracks]),
             np.concatenate([part.confidence for part in parts]) if is_estimated else NOT_ESTIMATED,
             parts[-1].velocity_deviation,
-            np.concatenate([part.velocity_variance for part in parts]),
+            np.concatenate(variances) if has_variances else NOT_ESTIMATED,
         )
 
     def move(self, before: Array, after: Array, turn: float) -> Detections:

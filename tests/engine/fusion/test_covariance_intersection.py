@@ -99,6 +99,17 @@ def test_tracks_of_uncertain_velocity_end_early(variance: float, lifetime: float
     assert [len(fuse([given], lifetime + late)) for late in (-0.01, 0.01)] == [1, 0]
 
 
+def test_fuse_accepts_variances_in_one_of_two_incomplete_reports(report: Make, fuse: Fuse) -> None:
+    """A custom tracker may state none at times. Such an object has the usual 0.25 m²/s²: (0.04 + 0.0225 + 0.054) m²."""
+    usual, stated = (
+        report("A", 0.0, [(20.0 * number, 0.0)], velocity=(0.0, 0.0), tracks=(number,), complete=False)
+        for number in (1, 2)
+    )
+    fused = fuse([usual, tracked(stated, 16.0)], 0.3)
+    expected = [0.04 + 0.09 * variance + 6.0 * 0.009 for variance in (0.25, 16.0)]
+    np.testing.assert_allclose(np.sort(fused.covariance[:, 0, 0]), expected, rtol=1e-9)
+
+
 @pytest.mark.parametrize("observed", [False, True])
 def test_fuse_keeps_senders_that_report_themselves_separate(observed: bool, report: Make, fuse: Fuse) -> None:
     """Two cars in neighboring lanes, whose reports are 1.5 s old, are within the gate; a third station sees both."""
