@@ -27,6 +27,8 @@ SELDOM_FIELDS = (*(360.0,) * 6, 180.0, 110.0, 100.0)
 """Fields of view of the others [degrees]."""
 _SPREAD = 60.0
 """Maximum distance of road users from the receiver [m]."""
+_FASTEST = (15.0, 50.0)
+"""Speed of the fastest motor vehicles in scenes of towns and of motorways [m/s]."""
 _ODDS = {
     0: {"car": 0.52, "van": 0.1, "ambulance": 0.03, "truck": 0.1, "firetruck": 0.04, "bus": 0.07, "motorbike": 0.06,
         "bicycle": 0.05, "pedestrian": 0.03},
@@ -107,6 +109,7 @@ class SceneMaker:
         center = lanes[lane, :2].copy()
         away = np.hypot(*(lanes[:, :2] - center).T)
         near = np.flatnonzero(away < _SPREAD)
+        pace = float(rng.choice(_FASTEST))
         entries: list[tuple[float, ...]] = []
         boxes = np.empty((0, 5))
 
@@ -131,7 +134,7 @@ class SceneMaker:
             person = shape == "pedestrian"
             turned = not straight and rng.random() < (0.95 if person else 0.1)
             heading += float(rng.uniform(-math.pi, math.pi)) if turned else float(rng.normal(0.0, 0.06))
-            fastest = {"pedestrian": 2.5, "bicycle": 7.0}.get(shape, 15.0)
+            fastest = {"pedestrian": 2.5, "bicycle": 7.0}.get(shape, pace)
             stands = kind == 1 or shape in ("rsu", "box") or rng.random() < (0.7 if turned and not person else 0.3)
             scale = tuple(rng.uniform(0.95, 1.05, 3).tolist()) if shape != "rsu" else (1.0, 1.0, 1.0)
             return add(mesh, x, y, heading, 0.0 if stands else float(rng.uniform(0.5, fastest)), scale)
