@@ -149,7 +149,6 @@ def compare(
     from eidrive_scenario.experiments.sweeps.comparison import NOT_WORSE, NamedComparison, compare_values
     from eidrive_scenario.experiments.sweeps.comparison import compare as compare_stores
     from eidrive_scenario.reporting.comparison import as_json, as_markdown, text_lines, write_comparison
-    from eidrive_scenario.simulation.result import typed
 
     if not 0.0 <= margin < 1.0:
         raise SettingError(Diagnostic(f"--margin is {margin}", "give a number from 0 to below 1"))
@@ -160,7 +159,7 @@ def compare(
     check_output_paths({"--html": html}, stores)
     if between is not None:
         name, equals, listed = between.partition("=")
-        values = [typed(text.strip()) for text in listed.split(",")] if equals else []
+        values = [text.strip() for text in listed.split(",")] if equals else []
         comparisons = compare_values(
             stores,
             name.strip(),

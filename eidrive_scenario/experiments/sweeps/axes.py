@@ -39,6 +39,7 @@ DESCRIPTIVE = frozenset({"name", "description"})
 """Settings of a channel profile that have no effect on runs."""
 _KINDS = {("delay", "seconds"): "constant", ("loss", "probability"): "bernoulli"}
 """Kind of a part of a channel that is selected if the part has no such setting: constant delay, independent losses."""
+_REPEATED = "a value is given twice"
 _RANGE_SIGN = re.compile(r"\s*(?:\.{2,3}|…|:|\bto\b)\s*")
 """Signs of a range, of which only the colon is one here."""
 
@@ -52,6 +53,7 @@ class Axis:
     values  values of a list or a range; () for an interval
     low, high  limits of an interval, for designs that sample
     is_whole   whether an interval consists of its whole numbers, as for a parameter of an integer type
+    texts      values of a list as written
     """
 
     name: str
@@ -59,6 +61,7 @@ class Axis:
     low: float = math.nan
     high: float = math.nan
     is_whole: bool = False
+    texts: tuple[str, ...] = ()
 
     @property
     def is_interval(self) -> bool:
@@ -115,10 +118,9 @@ def _parsed(text: str) -> Axis:
         raise ValueError("expected a value between commas")
     if any(map(_resembles_range, texts)):
         raise ValueError(f"write a range as {name}=LOW:HIGH:STEP, an interval as {name}=LOW:HIGH")
-    values = tuple(map(typed, texts))
-    if len(set(values)) < len(values):
-        raise ValueError("a value is given twice")
-    return Axis(name, values)
+    if len(set(texts)) < len(texts):
+        raise ValueError(_REPEATED)
+    return Axis(name, tuple(map(typed, texts)), texts=tuple(texts))
 
 
 def parse_axes(texts: list[str]) -> tuple[Axis, ...]:
@@ -243,34 +245,44 @@ _WHOLE = frozenset({ParameterType.INTEGER, ParameterType.INT, ParameterType.UNSI
 
 
 def with_types(axes: Sequence[Axis], scenario: Path, *, is_distribution: bool = False) -> tuple[Axis, ...]:
-    """Return the axes, of which intervals of parameters with an integer type consist of whole numbers.
+    """Return the axes with values of the types of their parameters.
+
+    Intervals of integer types consist of whole numbers. Values of strings are texts as written, unless all are those of
+    numbers: `1.10` differs from `1.1`.
 
     scenario  file of the scenario or of the distribution. Its errors are left to the plan of the sweep
 
-    Raise SettingError for such an interval without a whole number.
+    Raise SettingError for an interval of whole numbers without two of them, and for a list with a value twice.
     """
-    intervals = [axis for axis in axes if axis.is_interval and not is_setting(axis.name)]
-    if not intervals:
-        return tuple(axes)
-    names: set[str] = set()
-    with suppress(InputError):
-        source = load_distribution(scenario).scenario if is_distribution else scenario
-        declared = load_scenario(source).document.parameter_declarations
-        if declared is not None:
-            names = {
-                parameter.name for parameter in declared.parameter_declaration if parameter.parameter_type in _WHOLE
-            }
-    whole = {
-        axis.name: replace(axis, is_whole=True) for axis in intervals if axis.name.removeprefix(PARAMETER) in names
-    }
-    for axis in whole.values():
+    types: dict[str, ParameterType] = {}
+    if not all(is_setting(axis.name) for axis in axes):
+        with suppress(InputError):
+            source = load_distribution(scenario).scenario if is_distribution else scenario
+            declared = load_scenario(source).document.parameter_declarations
+            if declared is not None:
+                types = {parameter.name: parameter.parameter_type for parameter in declared.parameter_declaration}
+    return tuple(
+        _with_type(axis, None if is_setting(axis.name) else types.get(axis.name.removeprefix(PARAMETER)))
+        for axis in axes
+    )
+
+
+def _with_type(axis: Axis, parameter_type: ParameterType | None) -> Axis:
+    """Return an axis with values of the type of its parameter, None for another one. Raise as `with_types`."""
+    if axis.is_interval and parameter_type in _WHOLE:
+        axis = replace(axis, is_whole=True)
         low, high = axis.ends
         if low >= high:
             message = (
                 f"--vary: {axis.name} is a whole number, and {axis.low:g}:{axis.high:g} has fewer than two of them"
             )
             raise SettingError(Diagnostic(message, "give a larger interval"))
-    return tuple(whole.get(axis.name, axis) for axis in axes)
+    written = tuple(map(text_of_value, axis.values))
+    if axis.texts and parameter_type is ParameterType.STRING and written != axis.texts:
+        axis = replace(axis, values=axis.texts)
+    if len(set(axis.values)) < len(axis.values):
+        raise SettingError(Diagnostic(f"--vary: {axis.name}={','.join(written)}", _REPEATED))
+    return axis
 
 
 GRID = "grid"

@@ -24,6 +24,7 @@ from eidrive_scenario.experiments.sweeps.results import (
     values_of,
 )
 from eidrive_scenario.experiments.sweeps.store import ABORTED, CRASHED, INVALID, NOT_JUDGED, PASSED, StoredRun
+from eidrive_scenario.simulation.result import typed
 
 NOT_WORSE, WORSE, UNDECIDED = "not worse", "worse", "undecided"
 """Conclusions of a comparison."""
@@ -134,7 +135,7 @@ def compare_values(
 
     paths   stores or folders of results, which are combined
     axis    axis, or a parameter that a distribution varies
-    values  values of the axis, the reference first; () for all, numbers in ascending order
+    values  values of the axis, or their texts, the reference first; () for all, numbers in ascending order
     warn    function that gets a line for each damaged result, which is omitted
 
     Raise SettingError if a file is not a store, without such an axis or value, with a single or a repeated value, if no
@@ -146,6 +147,7 @@ def compare_values(
     if name is None:
         hint = suggestion(axis, axes) if axes else "the runs vary by their seeds only"
         raise SettingError(Diagnostic(f"--between: no axis {quoted(axis)}", hint))
+    values = [typed(value) if isinstance(value, str) and value not in axes[name] else value for value in values]
     for value in values:
         if value not in axes[name]:
             hint = f"the runs have {', '.join(map(text_of_value, axes[name]))}"

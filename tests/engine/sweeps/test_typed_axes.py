@@ -1,4 +1,4 @@
-"""Intervals of parameters with an integer type: designs and searches propose whole numbers."""
+"""Values of the types of parameters: whole numbers in intervals of integers, and texts of strings as written."""
 
 from __future__ import annotations
 
@@ -8,14 +8,18 @@ from pathlib import Path
 import pytest
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.experiments.sweeps.axes import Axis, parse_axis, points_of, with_types
+from eidrive_scenario.experiments.sweeps.axes import Axis, parse_axis, points_of, settings_at, with_types
+from eidrive_scenario.simulation import RunSettings
 
 COUNT = Axis("Count", low=0.5, high=4.5)
 
 
 @pytest.fixture
 def counted(scenario: Path) -> Path:
-    declared = '<ParameterDeclaration name="Count" parameterType="unsignedShort" value="2"/>'
+    declared = (
+        '<ParameterDeclaration name="Count" parameterType="unsignedShort" value="2"/>'
+        '<ParameterDeclaration name="Model" parameterType="string" value="van"/>'
+    )
     scenario.write_text(scenario.read_text().replace("<ParameterDeclarations>", f"<ParameterDeclarations>{declared}"))
     return scenario
 
@@ -39,3 +43,23 @@ def test_values_of_a_distribution_have_the_types_of_its_scenario(counted: Path, 
 def test_interval_without_two_whole_numbers_raises(counted: Path) -> None:
     with pytest.raises(SettingError, match=r"Count is a whole number, and 1\.2:2\.7 has fewer than two of them"):
         with_types([Axis("Count", low=1.2, high=2.7)], counted)
+
+
+@pytest.mark.parametrize("given", ["1.10,1.1", "1.10", "+5,5", "1e3,2"])
+def test_values_of_a_string_keep_their_texts(counted: Path, given: str) -> None:
+    points = points_of(with_types([parse_axis(f"Model={given}")], counted), "grid", None, 1)
+    assert [settings_at(point, RunSettings(), None).parameters["Model"] for point in points] == given.split(",")
+
+
+@pytest.mark.parametrize(
+    ("axis", "values"), [("Model=1,2.5", (1, 2.5)), ("Model=a,1", ("a", 1)), ("Speed=1.10,2", (1.1, 2))]
+)
+def test_other_numbers_remain_numbers(counted: Path, axis: str, values: tuple[object, ...]) -> None:
+    (typed_axis,) = with_types([parse_axis(axis)], counted)
+    assert typed_axis.values == values
+    assert [type(value) for value in typed_axis.values] == [type(value) for value in values]
+
+
+def test_one_number_in_two_forms_is_given_twice(counted: Path) -> None:
+    with pytest.raises(SettingError, match="a value is given twice"):
+        with_types([parse_axis("Speed=1.1,1.10")], counted)

@@ -64,6 +64,12 @@ def test_each_value_is_compared_with_the_first(tmp_path: Path) -> None:
     assert values_of(compare_values([path], "param.Gap", [10, 9.50])) == [(10, 9.5)]
 
 
+def test_texts_select_equal_texts_before_equal_numbers(tmp_path: Path) -> None:
+    path = store(tmp_path / "s.db", "Model", {"1.10": [True], "1.1": [True], 9.5: [False]})
+    assert values_of(compare_values([path], "Model", ["1.10", "1.1"])) == [("1.10", "1.1")]
+    assert values_of(compare_values([path], "Model", ["1.10", "9.50"])) == [("1.10", 9.5)]
+
+
 def test_value_without_a_partner_has_no_comparison(tmp_path: Path) -> None:
     path = store(tmp_path / "s.db", "Gap", {1: [True, False], 2: [None, None], 3: [None, True]})
     without, compared = compare_values([path], "Gap")
