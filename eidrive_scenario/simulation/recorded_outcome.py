@@ -15,9 +15,9 @@ from eidrive_scenario.evaluation.criteria_parser import CriteriaContext
 from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.openscenario import Scenario
-from eidrive_scenario.openscenario.model import Axles, MiscObject, Pedestrian, Vehicle
+from eidrive_scenario.openscenario.model import Axles, MiscObject, ParameterType, Pedestrian, Vehicle
 from eidrive_scenario.openscenario.model.entity_enumerations import VehicleCategory
-from eidrive_scenario.openscenario.values.parameters import Parameter, Scope
+from eidrive_scenario.openscenario.values.parameters import TYPES, Parameter, Scope, fits_type
 from eidrive_scenario.recording.codec import codec
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recorder import CHUNK_SIZE, Recorder
@@ -38,6 +38,8 @@ OUTCOME = "outcome.json"
 """Name of the attachment with the outcome."""
 CONTEXT = "criteria_context"
 """Entry of the metadata with the names of the scenario to which criteria refer."""
+PARAMETER_TYPES = "parameter_types"
+"""Entry of the metadata with the types of the parameters of the scenario, by name."""
 TRAILERS = "trailers"
 """Entry of the metadata with the vehicle categories of trailers and semitrailers, by name."""
 ROLES = "roles"
@@ -186,10 +188,13 @@ def plain_verdict(verdict: Verdict) -> Verdict:
 def scenario_metadata(scenario: Scenario) -> dict[str, str]:
     """Return the entries of the metadata of a run about its scenario.
 
-    They are `CONTEXT`, `TRAILERS` and `ROLES` if a vehicle has one, `AXLES` if there are vehicles,
-    `EXTERNAL_OBJECTS` if there are any, and `BODIES`.
+    They are `CONTEXT`, `PARAMETER_TYPES` if there are parameters, `TRAILERS` and `ROLES` if a vehicle has one, `AXLES`
+    if there are vehicles, `EXTERNAL_OBJECTS` if there are any, and `BODIES`.
     """
     metadata = {CONTEXT: canonical_json(codec(CriteriaContext).encode(criteria_context(scenario)))}
+    if (declared := scenario.document.parameter_declarations) is not None:
+        types = {parameter.name: parameter.parameter_type.value for parameter in declared.parameter_declaration}
+        metadata[PARAMETER_TYPES] = canonical_json(types)
     vehicles = {name: entity for name, entity in scenario.entities.items() if isinstance(entity, Vehicle)}
     towed = (VehicleCategory.TRAILER, VehicleCategory.SEMITRAILER)
     trailers = {
@@ -263,11 +268,19 @@ def recorded_context(recording: Recording) -> CriteriaContext:
 
 
 def recorded_scope(recording: Recording) -> Scope:
-    """Return the parameters of the run to which criteria on a recording refer. Those of a damaged one are unknown."""
+    """Return the parameters of the run to which criteria on a recording refer. Those of a damaged one are unknown.
+
+    Older recordings lack their types, and all are texts.
+    """
     texts: Mapping[str, str] = _metadata(recording, "parameters", Mapping[str, str], {})
-    # Their types are not recorded. Expressions take numbers from texts, and truth values only as such
-    values = {text: {"true": True, "false": False}.get(text, text) for text in texts.values()}
-    return Scope(parameters={name: Parameter(name, text, values[text], text) for name, text in texts.items()})
+    types: Mapping[str, ParameterType] = _metadata(recording, PARAMETER_TYPES, Mapping[str, ParameterType], {})
+    parameters = {}
+    for name, text in texts.items():
+        scalar = TYPES[types.get(name, ParameterType.STRING)]
+        # As in the run, where a default of another type makes the parameter a text
+        value = scalar.convert(text) if fits_type(text, scalar) else text
+        parameters[name] = Parameter(name, text, value, text)
+    return Scope(parameters=parameters)
 
 
 def _metadata(recording: Recording, name: str, kind: Any, unknown: _Entry) -> _Entry:

@@ -36,7 +36,14 @@ from eidrive_scenario.reporting.run_report.reported_runs import run_of_recording
 from eidrive_scenario.reporting.run_report.settings_text import run_facts, shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.simulation.recorded_outcome import BODIES, CONTEXT, TRAILERS, recorded_bodies, recorded_outcome
+from eidrive_scenario.simulation.recorded_outcome import (
+    BODIES,
+    CONTEXT,
+    PARAMETER_TYPES,
+    TRAILERS,
+    recorded_bodies,
+    recorded_outcome,
+)
 from eidrive_scenario.v2x.messages.message import LinkEvent
 
 
@@ -320,7 +327,7 @@ def _facts(recording: Recording, settings: Mapping[str, Any]) -> dict[str, str]:
     """Return the facts about the run that the page lists."""
     if settings:
         return run_facts(settings)
-    hidden = ("format", "parameters", "settings", "command", CONTEXT, TRAILERS, BODIES)
+    hidden = ("format", "parameters", "settings", "command", CONTEXT, PARAMETER_TYPES, TRAILERS, BODIES)
     facts = {name: shorten(text) for name, text in recording.metadata.items() if name not in hidden}
     return facts | run_facts({"parameters": _object(recording.metadata.get("parameters", "{}"))})
 

@@ -106,21 +106,24 @@ def test_other_criteria_replace_those_of_the_run(tmp_path: Path) -> None:
     assert judgement.exit_code == 1
 
 
-@pytest.mark.parametrize("strict", ["true", "false"])
-def test_other_criteria_use_truth_values_of_the_run_in_expressions(tmp_path: Path, strict: str) -> None:
-    """The run lasts 3 s."""
-    declared = '<ParameterDeclaration name="Strict" parameterType="boolean" value="true"/></ParameterDeclarations>'
+@pytest.mark.parametrize("strict", ["true", "false", "1", "0"])
+def test_other_criteria_use_truth_values_and_texts_of_the_run(tmp_path: Path, strict: str) -> None:
+    """The run lasts 3 s. A text remains one if it is that of a truth value."""
+    declared = (
+        '<ParameterDeclaration name="Strict" parameterType="boolean" value="true"/>'
+        f'<ParameterDeclaration name="Label" parameterType="string" value="{strict}"/></ParameterDeclarations>'
+    )
     path = tmp_path / "strict.xosc"
     text = PASSING_BY.read_text(encoding="utf-8").replace("</ParameterDeclarations>", declared)
     path.write_text(text, encoding="utf-8")
-    criterion = '{time_limit: {within: "${4 - 2 * (not $Strict)}"}}'
+    criterion = '{time_limit: {within: "${4 - 2 * (not $Strict)}", fatal: $Strict, name: $Label}}'
     result = run_and_save(
         path, settings=RunSettings(parameters={"Strict": strict}, criteria=criterion), out=tmp_path / "run"
     )
-    (of_run,) = [verdict for verdict in result.criteria if verdict.name == "time_limit"]
+    (of_run,) = [verdict for verdict in result.criteria if verdict.name == strict]
     (judged,) = judge_recording(tmp_path / "run", criterion).criteria
     assert repr(judged) == repr(of_run)
-    assert (judged.passed, judged.limit) == ((True, 4.0) if strict == "true" else (False, 2.0))
+    assert (judged.passed, judged.limit) == ((True, 4.0) if strict in ("true", "1") else (False, 2.0))
 
 
 @pytest.mark.parametrize(
