@@ -307,6 +307,11 @@ def quoted(value: object, length: int = 200) -> str:
     return shortened(repr(value), length * 2)
 
 
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun, such as `1 run` and `2 runs`; the plural adds an s to the last word."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def most_similar(word: str, candidates: Collection[str]) -> str | None:
     """Return the candidate that is most similar to a word; None without one, for a long word or many candidates."""
     if len(word) > _MAX_WORD or len(candidates) > _MAX_CANDIDATES:

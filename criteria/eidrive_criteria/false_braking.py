@@ -7,6 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from eidrive_scenario.api.common import counted
 from eidrive_scenario.api.criteria import Criterion, CriterionSettings, FalseTracks, Frame, Verdict, actor_never_present
 
 
@@ -52,9 +53,10 @@ class FalseBraking(Criterion):
             reason = f"{of} has no planner" if self._was_present else actor_never_present([of])
             return self.conclude(False, reason, limit=limit)
         brakings = self._tracks.brakings(of)
+        times = counted(brakings.number, "time")
         return self.conclude(
             self._violated is None,
-            f"{of} braked {brakings.number} times, {brakings.without_cause} times without a cause",
+            f"{of} braked {times}, {counted(brakings.without_cause, 'time')} without a cause",
             value=float(brakings.without_cause),
             limit=limit,
             first_violation=self._violated,

@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar, Literal, Self, TypeVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from eidrive_scenario.api.common import EPSILON, TIME_TOLERANCE, RoadNetwork, WorldView
+from eidrive_scenario.api.common import EPSILON, TIME_TOLERANCE, RoadNetwork, WorldView, counted
 from eidrive_scenario.api.criteria import (
     Continuity,
     Criterion,
@@ -243,7 +243,7 @@ class SummedCriterion(FollowedCriterion):
         elif self._first is None:
             reason = f"{self.of} never {self.state}"
         else:
-            amount = f"{self._sum:.2f} {self.unit}" if self.unit else f"{self._sum:.0f} times"
+            amount = f"{self._sum:.2f} {self.unit}" if self.unit else f"{counted(round(self._sum), 'time')}"
             reason = f"{self.of} {self.state}: {amount}, first at {self._first:.2f} s"
         return self.conclude(
             self.was_present and self._violated is None,

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from eidrive_criteria.folds import falls_below
 from eidrive_criteria.linked import LinkCriterion, LinkSettings
+from eidrive_scenario.api.common import counted
 from eidrive_scenario.api.criteria import Verdict
 from eidrive_scenario.api.v2x import LinkEvent
 
@@ -42,7 +43,7 @@ class PacketReceptionRatio(LinkCriterion):
 
     def verdict(self) -> Verdict:
         value = self._ratio()
-        reason = f"{self._delivered} of {self._number} messages {self.where} were delivered"
+        reason = f"{self._delivered} of {counted(self._number, 'message')} {self.where} were delivered"
         return self.conclude(
             not self.missing and (value is None or not falls_below(value, self._limit)),
             self.nothing("message") if value is None else reason,

@@ -28,6 +28,7 @@ from eidrive_scenario.errors import ScenarioError as ScenarioError
 from eidrive_scenario.errors import SettingError as SettingError
 from eidrive_scenario.errors import SimulationError as SimulationError
 from eidrive_scenario.errors import WallLimitError as WallLimitError
+from eidrive_scenario.errors import counted as counted
 from eidrive_scenario.errors import quoted as quoted
 from eidrive_scenario.errors import suggestion as suggestion
 from eidrive_scenario.extensions.registry import register as register

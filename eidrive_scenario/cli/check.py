@@ -13,7 +13,7 @@ from eidrive_scenario.base.wall_limit import LimitReached, limit_wall_time
 from eidrive_scenario.cli.options import HelpAll, check_output_paths, takes_run_options
 from eidrive_scenario.cli.output import echo, print_error, print_unused_projects
 from eidrive_scenario.cli.supervision import supervise
-from eidrive_scenario.errors import ABORTED, INVALID_INPUT, Diagnostic, InputError, WallLimitError
+from eidrive_scenario.errors import ABORTED, INVALID_INPUT, Diagnostic, InputError, WallLimitError, counted
 from eidrive_scenario.run_options import FLAGS, RunSettings, check_seconds, diagnostic_with_option_names
 
 if TYPE_CHECKING:
@@ -84,11 +84,14 @@ def check(
                     echo(f"{diagnostic}{_suffix(level, diagnostic.rule)}")
             printed[level].update(dict.fromkeys(diagnostics))
         if isinstance(report, DistributionCheckReport) and report.runs:
-            echo(f"{path}: {_count(report.runs, 'run')}")
+            echo(f"{path}: {counted(report.runs, 'run')}")
     print_unused_projects(printed["error"])
     if sarif is not None:
         _write_sarif(sarif, printed, aborted)
-    counts = [_count(len(files), "file"), *(_count(len(diagnostics), level) for level, diagnostics in printed.items())]
+    counts = [
+        counted(len(files), "file"),
+        *(counted(len(diagnostics), level) for level, diagnostics in printed.items()),
+    ]
     echo(", ".join(counts if printed["note"] else counts[:-1]))
     if aborted:
         raise typer.Exit(ABORTED)
@@ -164,7 +167,3 @@ def _files_below(folder: str, suffix: str) -> list[Path]:
     """Return the files with a suffix in a folder and its subfolders, sorted, without unreadable folders."""
     files = (Path(parent, name) for parent, _, names in os.walk(folder) for name in names if name.endswith(suffix))
     return sorted(files)
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -10,7 +10,7 @@ import typer
 
 from eidrive_scenario.cli.options import HelpAll, check_output_paths, parse_seeds, takes_run_options
 from eidrive_scenario.cli.output import echo, print_warnings
-from eidrive_scenario.errors import ABORTED, PASSED, Diagnostic, SettingError
+from eidrive_scenario.errors import ABORTED, PASSED, Diagnostic, SettingError, counted
 from eidrive_scenario.run_options import RunSettings
 
 if TYPE_CHECKING:
@@ -94,9 +94,9 @@ def dataset(
     failed = sum(bool(run.error) and not run.is_excluded for run in runs)
     frames = sum(run.frames for run in runs)
     warned = Counter(warning for run in runs for warning in run.warnings)
-    print_warnings(f"{warning} ({count} of {len(runs)} runs)" for warning, count in warned.items())
+    print_warnings(f"{warning} ({count} of {counted(len(runs), 'run')})" for warning, count in warned.items())
     kept = f", {len(planned) - len(runs)} already complete" if len(runs) < len(planned) else ""
-    echo(f"{len(runs)} runs, {frames} frames{kept}; {out}")
+    echo(f"{counted(len(runs), 'run')}, {counted(frames, 'frame')}{kept}; {out}")
     raise typer.Exit(ABORTED if failed else PASSED)
 
 
@@ -105,7 +105,7 @@ def _print(run: ExportedRun) -> None:
     if run.error:
         echo(f"{run.name}: {'excluded' if run.is_excluded else 'failed'}: {run.error}", err=True)
         return
-    echo(f"{run.name}: {run.frames} frames of {run.stations} stations")
+    echo(f"{run.name}: {counted(run.frames, 'frame')} of {counted(run.stations, 'station')}")
 
 
 def _import(folder: Path, out: Path) -> None:

@@ -17,6 +17,7 @@ from eidrive_scenario.errors import (
     InputError,
     ScenarioError,
     SettingError,
+    counted,
 )
 from eidrive_scenario.experiments.statistics.intervals import anytime_interval
 from eidrive_scenario.experiments.statistics.sequential import LIMIT, Decision, RatioTest
@@ -71,7 +72,7 @@ def run_distribution(
         raise ScenarioError(last.diagnostics)
     counts["not selected"] = repeat * (len(expansion) - len(numbers))
     summary = ", ".join(f"{count} {outcome}" for outcome, count in counts.items() if count)
-    echo(f"{repeat * len(expansion)} runs in {path}: {summary}", err=True)
+    echo(f"{counted(repeat * len(expansion), 'run')} in {path}: {summary}", err=True)
     return code
 
 

@@ -19,7 +19,7 @@ from eidrive_scenario.cli.options import (
     takes_run_options,
 )
 from eidrive_scenario.cli.output import echo, print_warnings
-from eidrive_scenario.errors import ABORTED, NOT_JUDGED, PASSED, Diagnostic, SettingError
+from eidrive_scenario.errors import ABORTED, NOT_JUDGED, PASSED, Diagnostic, SettingError, counted
 from eidrive_scenario.recording.run_files import RecordMode
 from eidrive_scenario.run_options import RunSettings, check_seconds
 
@@ -150,7 +150,10 @@ def sweep(
     )
     jobs = Shard(plan, *((1, 1) if shard is None else parse_shard(shard)))
     if dry_run:
-        echo(f"{len(jobs)} runs of {scenario}: {len(plan.points)} combinations, {len(plan.seeds)} seeds each")
+        echo(
+            f"{counted(len(jobs), 'run')} of {scenario}: {counted(len(plan.points), 'combination')}, "
+            f"{counted(len(plan.seeds), 'seed')} each"
+        )
         for point in plan.points[:10]:
             echo("  " + (", ".join(f"{name}={value}" for name, value in point.items()) or "no axis"))
         if len(plan.points) > 10:
@@ -189,7 +192,9 @@ def _print_summary(progress: SweepProgress, store: Path) -> None:
     counts = ", ".join(f"{count} {status}" for status, count in sorted(progress.counts.items()))
     stored = ", ".join(f"{count} {status}" for status, count in sorted(progress.stored.items()))
     kept = f", {progress.kept} already in the store ({stored})" if stored else ""
-    echo(f"{progress.done} runs in {progress.elapsed_s:.1f} s{f': {counts}' if counts else ''}{kept}; {store}")
+    echo(
+        f"{counted(progress.done, 'run')} in {progress.elapsed_s:.1f} s{f': {counts}' if counts else ''}{kept}; {store}"
+    )
     count, command = progress.warned
     if count:
         print_warnings([describe_warned(count, progress.done, command)])

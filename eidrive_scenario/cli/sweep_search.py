@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from eidrive_scenario.cli.console import console
 from eidrive_scenario.cli.output import echo
-from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.errors import Diagnostic, SettingError, counted
 from eidrive_scenario.experiments.sweeps.axes import Axis, check_different
 from eidrive_scenario.experiments.sweeps.jobs import SweepJob, SweepPlan
 from eidrive_scenario.experiments.sweeps.searches import Execute, falsify, find_boundary
@@ -126,7 +126,8 @@ class Search:
             self._find_boundary(plan, self.boundary, execute)
         if unjudged:
             run = next(iter(unjudged.values()))
-            echo(f"{len(unjudged)} runs have no verdict and do not count: {run.status}: {run.error}", err=True)
+            verbs = "has no verdict and does" if len(unjudged) == 1 else "have no verdict and do"
+            echo(f"{counted(len(unjudged), 'run')} {verbs} not count: {run.status}: {run.error}", err=True)
 
     def _find_boundary(self, plan: SweepPlan, axis: Axis, execute: Execute) -> None:
         boundary = find_boundary(
@@ -136,17 +137,19 @@ class Search:
             bound=self.bound,
             tolerance=self.tolerance,
             runs=self.runs,
-            shown=lambda estimate: echo(f"{estimate.runs} runs: {estimate.low:.4g} to {estimate.high:.4g}", err=True),
+            shown=lambda estimate: echo(
+                f"{counted(estimate.runs, 'run')}: {estimate.low:.4g} to {estimate.high:.4g}", err=True
+            ),
         )
         name = axis.name
         if math.isnan(boundary.value) or boundary.inside < 0.5:
-            runs = f"({boundary.runs} runs)"
+            runs = f"({counted(boundary.runs, 'run')})"
             echo(f"{name}: the success rate does not cross {self.bound:g} in the range if it is monotone {runs}")
             return
         change = "rises" if boundary.rising > 0.5 else "falls"
         echo(
             f"{name}: the success rate {change} through {self.bound:g} at {boundary.value:.4g} "
-            f"(95 %: {boundary.low:.4g} to {boundary.high:.4g}; {boundary.runs} runs)"
+            f"(95 %: {boundary.low:.4g} to {boundary.high:.4g}; {counted(boundary.runs, 'run')})"
         )
 
     def _falsify(self, plan: SweepPlan, execute: Execute) -> None:
@@ -156,9 +159,9 @@ class Search:
             execute,
             runs=self.runs,
             objective=self.objective,
-            shown=lambda done, failed: echo(f"{done} runs, {failed} failed", err=True),
+            shown=lambda done, failed: echo(f"{counted(done, 'run')}, {failed} failed", err=True),
         )
-        echo(f"{falsification.failed} of {falsification.runs} runs failed")
+        echo(f"{falsification.failed} of {counted(falsification.runs, 'run')} failed")
         for run in falsification.failures:
             echo(run.command)
         if not falsification.failures and falsification.least is not None:
@@ -193,7 +196,9 @@ class ProgressDisplay:
         now = time.perf_counter()
         if self._bar.disable and run is not None and now - self._printed >= INTERVAL:
             self._printed = now
-            self._console.print(f"{progress.kept + progress.done} of {progress.total} runs, {text}", soft_wrap=True)
+            self._console.print(
+                f"{progress.kept + progress.done} of {counted(progress.total, 'run')}, {text}", soft_wrap=True
+            )
 
 
 def state_of(progress: SweepProgress) -> str:

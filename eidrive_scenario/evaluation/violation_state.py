@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.step import AgentStep
+from eidrive_scenario.errors import counted
 from eidrive_scenario.evaluation.known_actors import GATE, known_actors, nearest_pairs
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.text.run_log import describe_decision
@@ -41,7 +42,7 @@ def describe_violation(frames: Sequence[Frame], actors: Sequence[str]) -> Iterat
             yield _perceived(frames, station, actor)
         yield _messages(frames, station)
     if len(stations) > _SHOWN:
-        yield f"and {len(stations) - _SHOWN} more stations"
+        yield f"and {counted(len(stations) - _SHOWN, 'more station')}"
 
 
 def _time(frame: Frame) -> float:

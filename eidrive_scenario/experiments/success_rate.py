@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from eidrive_scenario.errors import ABORTED, NOT_JUDGED, SimulationError
+from eidrive_scenario.errors import ABORTED, NOT_JUDGED, SimulationError, counted
 from eidrive_scenario.experiments.commands import reproduction_lines
 from eidrive_scenario.experiments.statistics.intervals import Proportion, anytime_interval
 from eidrive_scenario.experiments.statistics.sequential import Decision, RatioTest
@@ -38,7 +38,9 @@ class RateVerdict:
 
 def decision_text(test: RatioTest, decision: Decision, rate: Proportion) -> str:
     """Return the decision of a test of a required rate in one line."""
-    runs = f"{rate.successes} of {rate.trials} runs passed: {rate.share:.1%}, {rate.low:.1%} to {rate.high:.1%}"
+    runs = (
+        f"{rate.successes} of {counted(rate.trials, 'run')} passed: {rate.share:.1%}, {rate.low:.1%} to {rate.high:.1%}"
+    )
     confidence = 1.0 - test.false_pass
     return f"success rate of at least {test.bad:.1%} with a confidence of {confidence:.0%}: {decision} ({runs})"
 

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from eidrive_scenario.base.arrays import Bools
 from eidrive_scenario.driving.step import OWN_DECISIONS, StationAction, StationPerception
-from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+from eidrive_scenario.errors import Diagnostic, SettingError, counted, quoted
 from eidrive_scenario.gym.libraries import spaces
 from eidrive_scenario.gym.observations import nearest_rows
 from eidrive_scenario.gym.settings import ActionSettings, MetaSpeed, Pedals, SendMessages, TargetSpeed
@@ -103,7 +103,7 @@ def _space(action: ActionSettings) -> spaces.Space[Any]:
 
 def _numbers(given: Any, count: int) -> list[float]:
     """Return numbers in [-1, 1]."""
-    expected = f"{count} numbers from -1 to 1"
+    expected = f"{counted(count, 'number')} from -1 to 1"
     try:
         values = np.asarray(given, dtype=float).reshape(-1).tolist()
     except (TypeError, ValueError):
@@ -125,7 +125,7 @@ def _mask(given: Any, count: int) -> Bools:
     """Return `count` truth values."""
     value = np.asarray(given)
     if value.shape != (count,) or not np.isin(value, (0, 1)).all():
-        raise _outside(given, f"{count} numbers out of 0 and 1")
+        raise _outside(given, f"{counted(count, 'number')} out of 0 and 1")
     return value.astype(bool)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from eidrive_scenario.errors import ABORTED, NOT_JUDGED, EidriveError, ExtensionError, InputError
+from eidrive_scenario.errors import ABORTED, NOT_JUDGED, EidriveError, ExtensionError, InputError, counted
 from eidrive_scenario.files.bounded import MIB, read_regular_file
 from eidrive_scenario.files.encodable import encodable, printable
 
@@ -214,7 +214,7 @@ def essence(result: RunResult | RateVerdict) -> str:
     from eidrive_scenario.simulation import RunResult
 
     if not isinstance(result, RunResult):
-        return f"{result.rate.successes} of {result.rate.trials} runs passed"
+        return f"{result.rate.successes} of {counted(result.rate.trials, 'run')} passed"
     failed = next((verdict for verdict in result.criteria if not verdict.passed), None)
     if failed is not None:
         return essential_facts(failed)

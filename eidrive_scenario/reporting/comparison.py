@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from eidrive_scenario.errors import counted
 from eidrive_scenario.experiments.statistics.intervals import interval_text
 from eidrive_scenario.experiments.sweeps.axes import text_of_value
 from eidrive_scenario.experiments.sweeps.comparison import UNDECIDED, Comparison, NamedComparison
@@ -40,26 +41,26 @@ def _lines(comparison: Comparison) -> Iterator[str]:
     first, second = comparison.rates
     low, high = comparison.interval
     yield (
-        f"{counts.pairs} pairs of runs with a verdict, {comparison.identical} with equal trace hashes; "
-        f"{comparison.unpaired} runs without a partner"
+        f"{counted(counts.pairs, 'pair')} of runs with a verdict, {comparison.identical} with equal trace hashes; "
+        f"{counted(comparison.unpaired, 'run')} without a partner"
     )
     yield (
         f"A passed {first:.1%}, B passed {second:.1%}; "
-        f"only A passed in {counts.only_first} pairs, only B in {counts.only_second}"
+        f"only A passed in {counted(counts.only_first, 'pair')}, only B in {counts.only_second}"
     )
     yield (
         f"B - A: {counts.difference:+.1%} ({comparison.confidence:.0%}: {low:+.1%} to {high:+.1%}); "
         f"McNemar's exact test: p = {comparison.p_value:.3g}"
     )
     for name, paired in comparison.metrics.items():
-        interval = interval_text(paired.low, paired.high, "+.4g")
-        yield f"{name}: B - A {paired.mean:+.4g} ({comparison.confidence:.0%}: {interval}; {paired.pairs} pairs)"
+        interval, pairs = interval_text(paired.low, paired.high, "+.4g"), counted(paired.pairs, "pair")
+        yield f"{name}: B - A {paired.mean:+.4g} ({comparison.confidence:.0%}: {interval}; {pairs})"
     if comparison.is_not_worse:
         yield f"B is not worse than A by {comparison.margin:.1%} or more (p = {comparison.p_worse:.3g})"
     elif comparison.is_worse:
         yield "B is worse than A"
     elif comparison.lost:
-        yield f"undecided: B has no verdict of {comparison.lost} runs with a verdict in A; repeat them by --retry"
+        yield f"undecided: B has no verdict of {counted(comparison.lost, 'run')} with a verdict in A; repeat by --retry"
     else:
         yield (
             f"undecided: the runs do not show that B is not worse by {comparison.margin:.1%} or more "
@@ -140,7 +141,7 @@ def _table(comparisons: Sequence[NamedComparison]) -> tuple[list[str], list[_Row
             rows.append(_Row(name, cells, UNDECIDED, _no_pair(named, name, text_of_value(named.first))))
             continue
         counts, (low, high), (first, second) = comparison.verdicts, comparison.interval, comparison.rates
-        remark = f"{name}: no verdict of {comparison.lost} runs with a verdict of the reference"
+        remark = f"{name}: no verdict of {counted(comparison.lost, 'run')} with a verdict of the reference"
         cells = [
             str(counts.pairs),
             f"{first:.1%}",

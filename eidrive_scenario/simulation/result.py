@@ -11,7 +11,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.errors import NOT_JUDGED
+from eidrive_scenario.errors import NOT_JUDGED, counted
 from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.run_options import OPTIONS, with_option_names
 from eidrive_scenario.simulation.resolved_settings import ResolvedSettings
@@ -67,7 +67,7 @@ class RunResult:
         failed = [verdict.name for verdict in self.criteria if not verdict.passed]
         outcome = f"failed by {', '.join(failed)}" if failed else outcome_word(self)
         number = "" if self.run is None else f", run {self.run}"
-        warned = f", {len(self.warnings)} warning{'s' * (len(self.warnings) > 1)}" if self.warnings else ""
+        warned = f", {counted(len(self.warnings), 'warning')}" if self.warnings else ""
         head = f"{self.scenario}{number}, seed {self.seed}, channel {self.channel}"
         return f"{head}: {outcome} ({self.end_reason} at {self.simulated_s:.2f} s{warned})"
 

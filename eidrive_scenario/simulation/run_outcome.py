@@ -10,7 +10,7 @@ import msgspec
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.stack import DrivingStack
 from eidrive_scenario.driving.station_warnings import MotionlessStations
-from eidrive_scenario.errors import ABORTED, FAILED, NOT_JUDGED, PASSED, Diagnostic
+from eidrive_scenario.errors import ABORTED, FAILED, NOT_JUDGED, PASSED, Diagnostic, counted
 from eidrive_scenario.evaluation.criterion import CriteriaObserver, Criterion, Verdict, checked_metrics, checked_verdict
 from eidrive_scenario.evaluation.known_actors import FalseTracks
 from eidrive_scenario.openscenario import Scenario
@@ -179,10 +179,10 @@ def expired_messages(links: Mapping[tuple[str, str], LinkStatistics]) -> Iterato
             senders.setdefault(receiver, []).append(sender)
     for receiver, (sender, *others) in sorted(senders.items()):
         link = links[sender, receiver]
-        more = f", and messages of {len(others)} more station{'s' * (len(others) > 1)}" if others else ""
+        more = f", and messages of {counted(len(others), 'more station')}" if others else ""
         yield Diagnostic(
-            f"station {receiver!r} does not use {link.expired} of {link.received} received messages of {sender!r}"
-            f"{more}: they are too old on arrival (mean delay {link.mean_delay or 0.0:.3g} s)",
+            f"station {receiver!r} does not use {link.expired} of {counted(link.received, 'received message')} of "
+            f"{sender!r}{more}: they are too old on arrival (mean delay {link.mean_delay or 0.0:.3g} s)",
             "limits are its property report_timeout, and max_age or max_lateness of its fusion method",
         )
 
@@ -195,10 +195,10 @@ def simultaneous_messages(links: Mapping[tuple[str, str], LinkStatistics]) -> It
             senders.setdefault(receiver, []).append(sender)
     for receiver, (sender, *others) in sorted(senders.items()):
         lost = links[sender, receiver].lost
-        more = f", and those of {len(others)} more station{'s' * (len(others) > 1)}" if others else ""
+        more = f", and those of {counted(len(others), 'more station')}" if others else ""
         yield Diagnostic(
-            f"station {receiver!r} receives none of {lost} messages of {sender!r}{more}: it always transmits at the "
-            "same time (half_duplex)",
+            f"station {receiver!r} receives none of {counted(lost, 'message')} of {sender!r}{more}: it always "
+            "transmits at the same time (half_duplex)",
             "set a jitter of the channel above 0, or different properties message_phase",
         )
 

@@ -272,7 +272,7 @@ def test_own_method_enters_by_its_name(eidrive: Eidrive, tmp_path: Path, monkeyp
         assert cells[0]["traces"] == cells[1]["traces"]
 
         module.write_text(f"{OWN_METHOD}# changed\n")
-        assert eidrive(*arguments, "--out", "out").stdout.startswith("benchmark: 1 runs in")
+        assert eidrive(*arguments, "--out", "out").stdout.startswith("benchmark: 1 run in")
 
         repeated = eidrive(*shlex.split(cells[1]["command"])[1:], "--workers", 1)
         assert repeated.exit_code == 0, repeated.output

@@ -14,7 +14,7 @@ from eidrive_scenario.api.actions import (
     resolve_position,
     traffic,
 )
-from eidrive_scenario.api.common import Diagnostic, InputError, ScenarioError
+from eidrive_scenario.api.common import Diagnostic, InputError, ScenarioError, counted
 
 
 class TrafficInstanceAction(ActionBehaviour):
@@ -265,7 +265,7 @@ class TrafficAreaAction(TrafficInstanceAction):
 
     def describe(self) -> str:
         """Describe the number."""
-        return f"{self.action.number_of_entities} participants in an area"
+        return f"{counted(self.action.number_of_entities, 'participant')} in an area"
 
 
 class TrafficStopAction(ActionBehaviour):

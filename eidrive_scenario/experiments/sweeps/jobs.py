@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.base.content_digest import canonical_json, sha256_of
-from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError, SettingError, suggestion
+from eidrive_scenario.errors import ConstraintError, Diagnostic, InputError, SettingError, counted, suggestion
 from eidrive_scenario.experiments.sweeps.axes import (
     CHANNEL,
     PARAMETER,
@@ -355,7 +355,7 @@ def _seeds(points: int, seeds: list[int] | None, runs: int | None) -> Sequence[i
         if any(abs(seed) > GREATEST_SEED for seed in seeds):
             raise SettingError(Diagnostic("--seeds: a seed is beyond the integers of a store", "give at most 2^63 - 1"))
         if runs is not None and runs > points * len(seeds):
-            hint = f"there are {points} combinations with {len(seeds)} seeds"
+            hint = f"the sweep has {counted(points, 'combination')} with {counted(len(seeds), 'seed')}"
             raise SettingError(Diagnostic(f"--runs is {runs}", hint))
         return seeds
     return range(1, 1 + (-(-runs // points) if runs is not None and points else 1))

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 import msgspec
 
 from eidrive_scenario.base.imports import optional_import
-from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.errors import Diagnostic, SettingError, counted
 from eidrive_scenario.experiments.statistics.intervals import Proportion, anytime_interval, clopper_pearson, wilson
 from eidrive_scenario.experiments.sweeps.axes import axis_identity, without_run
 from eidrive_scenario.experiments.sweeps.result_folders import folder_runs, varying, with_axes
@@ -206,7 +206,7 @@ def warned(runs: Sequence[StoredRun]) -> str:
 
 def describe_warned(count: int, total: int, command: str) -> str:
     """Return that `count` of `total` runs have warnings, and the command that prints those of the first, if known."""
-    text = f"{count} of {total} runs {'has' if count == 1 else 'have'} warnings"
+    text = f"{count} of {counted(total, 'run')} {'has' if count == 1 else 'have'} warnings"
     return f"{text}; to print those of the first: {command}" if command else text
 
 

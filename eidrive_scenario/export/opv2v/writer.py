@@ -12,7 +12,7 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import rigid_transform, rotation_matrix
 from eidrive_scenario.driving.agent_factory import station_sensors
 from eidrive_scenario.driving.stack import DrivingStack
-from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError
+from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError, counted
 from eidrive_scenario.export.opv2v.frame_files import frame_text, write_file, write_pcd, write_png
 from eidrive_scenario.export.opv2v.poses import MIRROR, opv2v_pose
 from eidrive_scenario.export.opv2v.reader_limits import ReaderLimits
@@ -209,7 +209,8 @@ class Opv2vWriter:
             self.warnings.append(f"stations never enter and have no folder: {', '.join(absent)}")
         removed = set.union(*present) - common
         if removed:
-            self.warnings.append(f"{len(removed)} frames are omitted, in which a station is absent")
+            verb = "is" if len(removed) == 1 else "are"
+            self.warnings.append(f"{counted(len(removed), 'frame')} {verb} omitted, in which a station is absent")
         for name in self._written:
             folder = self.folder / str(self.stations[name])
             for path in [path for number in removed for path in folder.glob(f"{number:06d}[._]*")]:

@@ -17,7 +17,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.assignment import associate
 from eidrive_scenario.base.geometry import rigid_transform, rotation_matrix
-from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+from eidrive_scenario.errors import Diagnostic, SettingError, counted, quoted
 from eidrive_scenario.export.traffic_recording.scene import (
     LIDAR_HEIGHT,
     MAX_NUMBER,
@@ -165,9 +165,8 @@ def read_scenes(folder: Path) -> Iterator[TrafficScene]:
         if frame is not None:
             sequences.setdefault(frame.sequence, []).append(frame)
     missing = frames.count(None)
-    warnings = (
-        [f"{missing} of {len(frames)} pairs of frames are omitted: {LABELS} lacks their labels"] if missing else []
-    )
+    omitted = f"{missing} of {counted(len(frames), 'pair')} of frames {'is' if missing == 1 else 'are'} omitted"
+    warnings = [f"{omitted}: {LABELS} lacks their labels"] if missing else []
     for name, of_sequence in sorted(sequences.items()):
         of_sequence.sort(key=lambda frame: frame.time)
         scene = _scene(folder, f"sequence_{name}" if name else folder_name(folder), of_sequence)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
+from eidrive_scenario.errors import counted
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.reading.schema import rules
@@ -225,7 +226,8 @@ def _nurbs(curve: model.Nurbs) -> str:
     if points < order:
         return f"Nurbs of order {order} has {points} control points; at least {order} are required"
     if len(knots) != points + order:
-        return f"Nurbs has {len(knots)} knots; {points} control points of order {order} require {points + order}"
+        required = f"{points} control points of order {order} require {points + order}"
+        return f"Nurbs has {counted(len(knots), 'knot')}; {required}"
     if any(after < before for before, after in pairwise(knots)):
         return "Nurbs has descending knots; each must be at least the previous one"
     if knots[order - 1] == knots[points]:

@@ -77,7 +77,7 @@ class ExternalNetwork(ImageNetwork):
             return self._candidates(outputs)
         except (ValueError, IndexError) as error:
             shapes = ", ".join(str(output.shape) for output in outputs)
-            expected = f"{self._layout!r} for {len(self.classes)} classes"
+            expected = f"{self._layout!r} for {len(self.classes)} class{'es' * (len(self.classes) != 1)}"
             message = f"weights {quoted(str(self._path))} return {shapes}, which is not {expected}: {error}"
             raise SettingError(Diagnostic(message, f"layouts: {LAYOUTS}")) from error
 

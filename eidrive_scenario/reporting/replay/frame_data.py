@@ -13,6 +13,7 @@ import numpy as np
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
+from eidrive_scenario.errors import counted
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.reporting.drawing.canvas import ellipse_of_95_percent
@@ -79,7 +80,7 @@ class MessageList:
 def describe_content(message: Message) -> str:
     """Return the content of a message: its kind, the number of objects by class, and whatever else it contains."""
     if (frame := message.features) is not None:
-        return f"FEATURES, {len(frame.cells)} cells, frame {frame.number + 1} of {frame.count}"
+        return f"FEATURES, {counted(len(frame.cells), 'cell')}, frame {frame.number + 1} of {frame.count}"
     parts = [message.kind.upper()]
     numbers = Counter(message.detections.classes)
     listed = ", ".join(name if number == 1 else f"{name} ({number})" for name, number in sorted(numbers.items()))

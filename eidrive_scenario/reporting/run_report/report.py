@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.base.installation import ENGINE
-from eidrive_scenario.errors import Diagnostic, InputError
+from eidrive_scenario.errors import Diagnostic, InputError, counted
 from eidrive_scenario.experiments.reported_run import OUTCOMES, ReportedRun, parse_run
 from eidrive_scenario.experiments.statistics.intervals import Summary, summarize
 from eidrive_scenario.files.bounded import path_argument
@@ -140,8 +140,7 @@ def _warnings(runs: Sequence[ReportedRun]) -> list[str]:
         for warning in run.warnings:
             commands.setdefault(warning, run.command)
     lines = [
-        f"{count} run{'' if count == 1 else 's'}: {warning}"
-        + f" (such as {commands[warning]})" * bool(commands[warning])
+        f"{counted(count, 'run')}: {warning}" + f" (such as {commands[warning]})" * bool(commands[warning])
         for warning, count in counts.most_common(MOST_WARNINGS)
     ]
     left = len(counts) - len(lines)
@@ -171,7 +170,7 @@ def report_origin(runs: Sequence[ReportedRun]) -> dict[str, str]:
     """Return what the header of a report states, by title; without the commit outside of a Git repository."""
     given = [run.settings.get("versions") for run in runs]
     versions = {str(names[ENGINE]) for names in given if isinstance(names, dict) and ENGINE in names}
-    machine = f"{platform.node()}, {platform.system()} {platform.machine()}, {os.cpu_count()} cores"
+    machine = f"{platform.node()}, {platform.system()} {platform.machine()}, {counted(os.cpu_count() or 1, 'core')}"
     entries = {
         "version": f"{ENGINE} {', '.join(sorted(versions)) or version(ENGINE)}",
         "commit": _commit(),

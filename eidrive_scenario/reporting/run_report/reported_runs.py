@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from eidrive_scenario.errors import Diagnostic, InputError, SettingError
+from eidrive_scenario.errors import Diagnostic, InputError, SettingError, counted
 from eidrive_scenario.experiments.reported_run import ReportedRun, parse_run
 from eidrive_scenario.experiments.sweeps.results import runs_with_stores
 from eidrive_scenario.experiments.sweeps.store import FOLDER, StoredRun
@@ -126,7 +126,7 @@ def _as_result(run: StoredRun) -> dict[str, Any]:
         "end_reason": result.get("end_reason"),
         "criteria": criteria,
         "metrics": {name: value for name, value in result.items() if _is_metric(name, value)},
-        "warnings": [f"{count} warning{'' if count == 1 else 's'}, printed by the command of the run"] if count else [],
+        "warnings": [f"{counted(count, 'warning')}, printed by the command of the run"] if count else [],
         "parameters": settings.get("parameters", {}),
         "settings": settings,
         "settings_sha256": result.get("settings_sha256", ""),

@@ -14,7 +14,7 @@ import numpy as np
 from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
-from eidrive_scenario.errors import Diagnostic, quoted
+from eidrive_scenario.errors import Diagnostic, counted, quoted
 from eidrive_scenario.openscenario.model import Element
 from eidrive_scenario.traffic.spawning.bodies import Participant, TrafficMix, WeightedChoice
 from eidrive_scenario.traffic.spawning.population import CarGroup, CentralObject, Changes, Population
@@ -99,7 +99,7 @@ class MaintainedTraffic(TrafficGenerator):
         """Warning that the participants were never complete; None if they were, and before the first attempt."""
         if self._most is None or self._most >= self.count:
             return None
-        message = f"at most {self._most} of {self.count} road users found a free place"
+        message = f"at most {self._most} of {counted(self.count, 'road user')} found a free place"
         return self._warning(message, "enlarge the area, or reduce the number")
 
 

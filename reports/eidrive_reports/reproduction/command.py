@@ -69,6 +69,7 @@ def reproduce(
     from eidrive_reports.reproduction.page import write_benchmark_page, write_paper_page, write_part_replays
     from eidrive_reports.reproduction.parts import ALL, selected_detectors, selected_parts
     from eidrive_reports.reproduction.reproduce import reproduce as reproduce_part
+    from eidrive_scenario.api.common import counted
 
     if str(out) == "-":
         raise typer.BadParameter("- is not a path", param_hint="--out")
@@ -101,7 +102,7 @@ def reproduce(
         page = write_benchmark_page(out) if part.name == benchmark.NAME else write_paper_page(out)
         kept = len(done.episodes) - done.added
         typer.echo(
-            f"{part.name}: {done.added} runs in {done.elapsed_s:.0f} s, {kept} from the record; all "
+            f"{part.name}: {counted(done.added, 'run')} in {done.elapsed_s:.0f} s, {kept} from the record; all "
             f"{len(done.episodes)} took {done.computed_s:.0f} s of one process; wrote {out / part.name}.md and {page}"
         )
         if done.unused:

@@ -97,7 +97,7 @@ def test_compare_command_states_intervals_of_metrics(eidrive: Eidrive, tmp_path:
     assert "gap: B - A +1 (95%: -3.303 to +5.303; 3 pairs)" in done.stdout
     alone = [store(tmp_path / f"{name}.db", name, [True]) for name in "cd"]
     done = eidrive("compare", *alone, "--metric", "gap")
-    assert "gap: B - A +0 (95%: no interval, too few values; 1 pairs)" in done.stdout
+    assert "gap: B - A +0 (95%: no interval, too few values; 1 pair)" in done.stdout
 
 
 def test_compare_with_unknown_metric_names_known_ones(tmp_path: Path) -> None:

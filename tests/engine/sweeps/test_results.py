@@ -183,7 +183,7 @@ def test_sweep_command_runs_and_continues(eidrive: Eidrive, scenario: Path, tmp_
     runs = ("sweep", scenario, "--vary", "Speed=10,30")
     arguments = (*runs, "--store", tmp_path / "s.db", "--workers", "1")
     assert eidrive(*runs, "--dry-run").stdout.splitlines() == [
-        f"2 runs of {scenario}: 2 combinations, 1 seeds each",
+        f"2 runs of {scenario}: 2 combinations, 1 seed each",
         "  Speed=10",
         "  Speed=30",
     ]

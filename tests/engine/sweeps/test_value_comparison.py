@@ -160,7 +160,7 @@ def test_command_writes_text_json_markdown_and_page(eidrive: Eidrive, tmp_path: 
     assert [row.replace(r"\|", "").count("|") for row in rows] == [10] * 4
     assert rows[2].startswith(r"| `` a\|b `x` <script> *y* `` | **undecided** | 3 | 100.0% | 33.3% | 2 | 0 | -66.7% (")
     assert rows[3].startswith("| `z` | **undecided** | 0 |")
-    assert "no verdict of 1 runs" in done.stdout
+    assert "no verdict of 1 run" in done.stdout
     assert "no run of z has a partner" in done.stdout
     done = eidrive("compare", path, "--between", "Gap")
     assert done.exit_code == 1
