@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from eidrive_scenario.errors import ABORTED, FAILED, NOT_JUDGED, PASSED
 from eidrive_scenario.evaluation import Verdict
 from eidrive_scenario.experiments.commands import reproduction_lines
 from eidrive_scenario.files.encodable import printable
+from eidrive_scenario.recording.run_files import RECORDING
 from eidrive_scenario.recording.text.run_log import describe_kind
 from eidrive_scenario.reporting.storyboard_diagram.layout import remark_of
 from eidrive_scenario.simulation import RunResult
@@ -97,13 +99,43 @@ def show(result: RunResult, varied: str = "") -> None:
 def show_judgement(judgement: Judgement) -> None:
     """Print the verdicts on a recording, and its warnings."""
     out = console()
-    word, style = _OUTCOMES[judgement.exit_code]
-    if judgement.exit_code == ABORTED and judgement.end_reason != TIME_LIMIT:
-        word = "incomplete or damaged"
-    out.print(Text.assemble((judgement.scenario, "bold"), f"  seed {judgement.seed}  recorded  ", (word, style)))
+    title = f"  seed {judgement.seed}  recorded  "
+    out.print(Text.assemble((judgement.scenario, "bold"), title, _outcome_of(judgement)))
     _print_table(out, judgement.criteria)
     out.print(Text(f"end: {judgement.end_reason} at {judgement.simulated_s:.2f} s"))
     print_warnings(judgement.warnings)
+
+
+def show_judgements(judgements: Sequence[Judgement]) -> None:
+    """Print the verdicts on several recordings as a table with a column of each criterion, and counts of outcomes."""
+    out = console()
+    names = list(dict.fromkeys(verdict.name for judgement in judgements for verdict in judgement.criteria))
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in ("recording", "scenario", "seed", "", *names):
+        table.add_column(Text(heading), no_wrap=heading == "seed")
+    for judgement in judgements:
+        cells = {verdict.name: Text.assemble(_mark(verdict), _value_of(verdict)) for verdict in judgement.criteria}
+        path = judgement.recording
+        folder = path.parent if path.name == RECORDING else path
+        run = (Text(str(folder)), Text(judgement.scenario), str(judgement.seed), _outcome_of(judgement))
+        table.add_row(*run, *(cells.get(name, "") for name in names))
+    out.print(table)
+    counts = Counter(_outcome_of(judgement).plain for judgement in judgements)
+    out.print(f"{len(judgements)} recordings: {', '.join(f'{count} {word}' for word, count in counts.items())}")
+
+
+def _outcome_of(judgement: Judgement) -> Text:
+    word, style = _OUTCOMES[judgement.exit_code]
+    is_complete = judgement.exit_code != ABORTED or judgement.end_reason == TIME_LIMIT
+    return Text(word if is_complete else "incomplete or damaged", style)
+
+
+def _mark(verdict: Verdict) -> Text:
+    return Text("passed", style="green") if verdict.passed else Text("failed", style="red")
+
+
+def _value_of(verdict: Verdict) -> str:
+    return "" if verdict.value is None else f" {quantity_text(verdict.value, verdict.unit)}"
 
 
 def _print_table(out: Console, criteria: Sequence[Verdict]) -> None:
@@ -116,9 +148,8 @@ def _print_table(out: Console, criteria: Sequence[Verdict]) -> None:
             heading, justify="right" if heading in ("value", "limit") else "left", no_wrap=heading != "reason"
         )
     for verdict in criteria:
-        mark = Text("passed", style="green") if verdict.passed else Text("failed", style="red")
         quantities = [Text(quantity_text(number, verdict.unit)) for number in (verdict.value, verdict.limit)]
-        table.add_row(Text(verdict.name), mark, *quantities, Text(verdict.reason))
+        table.add_row(Text(verdict.name), _mark(verdict), *quantities, Text(verdict.reason))
     out.print(table)
     for verdict in criteria:
         if verdict.violation_state:

@@ -14,7 +14,9 @@ from eidrive_scenario.errors import Diagnostic, SettingError
 
 
 def judge(
-    recording: Annotated[Path, typer.Argument(help="A recording.mcap, or the folder of a run.")],
+    recordings: Annotated[
+        list[Path], typer.Argument(metavar="RECORDING", help="A recording.mcap, or a folder of one or several runs.")
+    ],
     criterion: Annotated[
         list[str] | None,
         typer.Option(
@@ -22,26 +24,35 @@ def judge(
             help="Criteria instead of those of the run, such as '{collision: {of: Ego}}'; repeatable.",
         ),
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON object only.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object per recording only.")] = False,
 ) -> None:
-    """Judge a recorded run again, with its own criteria or with other ones.
+    """Judge recorded runs again, with their own criteria or with other ones; several in one table.
 
     Example: eidrive judge reports/scenario_1 --criterion '{max_speed: {of: Ego, at_most: 10}}'
 
-    Exit codes as for eidrive run; 3 also for an incomplete or damaged recording.
+    Exit codes as for eidrive run, of several runs the highest; 3 also for an incomplete or damaged recording.
     """
     from eidrive_scenario.experiments.judgement import judge_recording
     from eidrive_scenario.experiments.single_run import as_json_text
+    from eidrive_scenario.recording.run_files import recordings_in
 
-    judgement = judge_recording(recording, criterion or None)
-    if json:
-        echo(as_json_text(judgement, ascii_only=not has_all_characters()))
-        print_warnings(judgement.warnings)
-    else:
-        from eidrive_scenario.cli.console import show_judgement
+    paths = [path for location in recordings for path in recordings_in(location)]
+    judgements = []
+    for path in paths:
+        judgement = judge_recording(path, criterion or None)
+        judgements.append(judgement)
+        if json:
+            echo(as_json_text(judgement, ascii_only=not has_all_characters()))
+        if json or len(paths) > 1:
+            print_warnings(f"{path}: {warning}" if len(paths) > 1 else warning for warning in judgement.warnings)
+    if not json:
+        from eidrive_scenario.cli.console import show_judgement, show_judgements
 
-        show_judgement(judgement)
-    raise typer.Exit(judgement.exit_code)
+        if len(judgements) == 1:
+            show_judgement(judgements[0])
+        else:
+            show_judgements(judgements)
+    raise typer.Exit(max(judgement.exit_code for judgement in judgements))
 
 
 TableName = Literal["actors", "objects", "plans", "messages", "transitions", "verdicts"]

@@ -35,17 +35,24 @@ def recording_in(location: Path) -> Path:
 
     If a run did not end, its partial recording is returned. Raise InputError if there is no recording, or several.
     """
+    path, *others = paths = recordings_in(location)
+    if others:
+        listed = ", ".join(str(path.parent.relative_to(location)) for path in paths[:5])
+        more = f" and {len(paths) - 5} more" if len(paths) > 5 else ""
+        message = f"{len(paths)} recordings are below this folder"
+        raise InputError(Diagnostic(message, f"give one of its folders: {listed}{more}", str(location)))
+    return path
+
+
+def recordings_in(location: Path) -> list[Path]:
+    """Return the recording of a run folder, or all recordings below it, as `recording_in`, at least one."""
     if not os.path.isdir(location):
-        return location
-    for candidates in ([location / RECORDING, partial_path(location / RECORDING)], _recordings_below(location)):
-        paths = [path for path in candidates if path.is_file()]
-        if len(paths) == 1 or (paths and paths[0].parent == location):
-            return paths[0]
-        if paths:
-            listed = ", ".join(str(path.parent.relative_to(location)) for path in paths[:5])
-            more = f" and {len(paths) - 5} more" if len(paths) > 5 else ""
-            message = f"{len(paths)} recordings are below this folder"
-            raise InputError(Diagnostic(message, f"give one of its folders: {listed}{more}", str(location)))
+        return [location]
+    for path in (location / RECORDING, partial_path(location / RECORDING)):
+        if path.is_file():
+            return [path]
+    if paths := [path for path in _recordings_below(location) if path.is_file()]:
+        return paths
     message = f"no {RECORDING} in this folder"
     raise InputError(Diagnostic(message, "eidrive run … --out DIR writes a recording", str(location)))
 

@@ -23,6 +23,22 @@ def test_judge_prints_criteria_of_run_with_its_exit_code(
     assert all(verdict["reason"] in shown for verdict in first["criteria"])
 
 
+def test_judge_of_several_recordings_prints_one_table(eidrive: Eidrive, passing_by: Path, tmp_path: Path) -> None:
+    """The folder of all runs has the recordings of both folders; the exit code is the highest one."""
+    folders = [tmp_path / "runs" / other_y for other_y in ("5", "0")]
+    for folder in folders:
+        eidrive("run", passing_by, "--param", f"OtherY={folder.name}", "--out", folder)
+    for words in (sorted(folders), [tmp_path / "runs"]):
+        judged = eidrive("judge", *words)
+        heading, collided, passed, summary = judged.stdout.splitlines()
+        assert ("min_distance" in heading, judged.exit_code) == (True, 1)
+        assert (str(folders[1]) in collided, "failed" in collided) == (True, True)
+        assert (str(folders[0]) in passed, "failed" in passed) == (True, False)
+        assert summary == "2 recordings: 1 failed, 1 passed"
+    objects = map(json.loads, eidrive("judge", *folders, "--json").stdout.splitlines())
+    assert [judgement["passed"] for judgement in objects] == [True, False]
+
+
 def test_judged_scenario_has_the_name_of_its_run(eidrive: Eidrive, tmp_path: Path) -> None:
     """`coop` and `pipeline` have scenarios of equal file names."""
     run = eidrive("run", "pipeline/scenario_1", "--time-limit", "0.5", "--out", tmp_path, "--json")
