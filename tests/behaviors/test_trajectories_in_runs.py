@@ -302,6 +302,25 @@ def test_speed_change_on_a_trajectory_with_headings_against_it_continues_its_mot
     assert row(played, 4.0)[0] > row(played, 3.0)[0] > row(played, 1.0)[0]
 
 
+@pytest.mark.element("SpeedAction")
+@pytest.mark.parametrize("trajectory_is_first", [True, False])
+@pytest.mark.parametrize(("duration", "start"), [(0.0, 3.925), (2.0, 3.925), (2.0, 2.975)])
+def test_speed_action_at_the_end_of_a_trajectory_keeps_the_direction(
+    run: Run, trajectory_is_first: bool, duration: float, start: float
+) -> None:
+    """Tail first over 40 m at 10 m/s. The change to 12 m/s starts in the last step, from 3.95 to 4 s, or 1 s before."""
+    steps = [("Ego", follow(AGAINST), after(-1.0)), ("Ego", speed_xml(12.0, duration), after(start))]
+    played = run(
+        6.5,
+        *(steps if trajectory_is_first else reversed(steps)),
+        driven=False,
+        init=init_xml("Ego", teleport_xml(world(100.0, -2.0, math.pi)), speed_xml(10.0)),
+    )
+    assert row(played, 6.5)[3] == pytest.approx(-12.0)
+    positions = [row(played, 0.05 * step)[0] for step in range(1, 130)]
+    assert positions == sorted(positions)
+
+
 def test_headings_that_turn_against_the_curve_change_the_sign_of_the_speed(run: Run) -> None:
     """A turn by 180° within 2 m, and back: the motion towards +x continues."""
     places = [(100.0, 0.0), (120.0, 0.0), (122.0, math.pi), (140.0, math.pi), (142.0, 0.0), (900.0, 0.0)]

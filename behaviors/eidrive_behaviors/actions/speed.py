@@ -68,6 +68,7 @@ class SpeedAction(ActionBehaviour):
     def initialise(self) -> None:
         """Start the transition from the current speed."""
         self._start = start = self._current_speed()
+        self._sense = self.actor.motion.sense if self._relative is None else None
         target = self._target()
         self._transition = self._build_transition(start, target)
         self._warn_of_limits(start, target)
@@ -112,7 +113,7 @@ class SpeedAction(ActionBehaviour):
             speed = self._approach(speed)
         if self._limiter is not None and self.context.dt > 0.0:
             speed = self._limiter.advance(speed, self.context.dt)
-        self.actor.motion.set_speed(speed)
+        self.actor.motion.set_speed(speed, self._sense)
         reached = transition.done and abs(speed - transition.target) < EPSILON
         return Status.SUCCESS if reached and not self._continuous else Status.RUNNING
 

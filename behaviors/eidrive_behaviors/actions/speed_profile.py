@@ -66,7 +66,7 @@ class SpeedProfileAction(ActionBehaviour):
 
     def initialise(self) -> None:
         """Build the profile from the current speed."""
-        start = self.actor.motion.speed
+        start, self._sense = self.actor.motion.speed, self.actor.motion.sense
         corners = self._corners(start)
         self._segments = linear_segments(corners)
         self._limiter: RateLimitedValue | None = None
@@ -120,7 +120,7 @@ class SpeedProfileAction(ActionBehaviour):
             warn_of_reverse(self, speed)
             self.actor.set_goal(replace(self.actor.goal or Goal(), speed=speed, acceleration=0.0 if done else slope))
         else:
-            self.actor.motion.set_speed(speed)
+            self.actor.motion.set_speed(speed, self._sense)
         return Status.SUCCESS if done else Status.RUNNING
 
     def _corners(self, start: float) -> list[tuple[float, float]]:

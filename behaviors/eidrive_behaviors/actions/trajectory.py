@@ -261,15 +261,13 @@ class FollowTrajectoryAction(ActionBehaviour):
     def terminate(self, new_status: Status) -> None:
         """Remove the progress along the trajectory, so that no distance refers to it any more.
 
-        From now on, the speed of the actor refers to its heading. If the action is stopped, a driven vehicle leaves the
+        Afterwards the speed of the actor refers to its heading. If the action is stopped, a driven vehicle leaves the
         trajectory.
         """
         if new_status is Status.INVALID and self._driven is not None:
             self.actor.end_path(self._driven.path, self._driven.before)
         if self._followed is not None:
-            motion = self.actor.motion
-            motion.set_speed(motion.speed_along_heading)
-            motion.set_backing(False)
+            self.actor.motion.leave_curve(after_step=new_status is Status.SUCCESS)
             if self.actor.progress is self._followed:
                 self.actor.set_progress(None)
         self._followed = None

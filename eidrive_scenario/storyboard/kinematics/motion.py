@@ -56,16 +56,33 @@ class Motion(MotionState):
         self._lane_distance: float | None = None
         self._crosses = False
         self._teleport = False
+        self._leaves_curve = False
+        """Whether the speed refers to the heading after the current step, and no longer to a trajectory."""
         self._stops = False
         """Whether the actor stops in the next step, unless an action moves it."""
 
-    def set_speed(self, speed: float) -> None:
-        """Set the speed [m/s] from the current step on."""
-        self._speed, self._rests, self._stops = speed, False, False
+    def set_speed(self, speed: float, sense: int | None = None) -> None:
+        """Set the speed [m/s] from the current step on.
+
+        sense  sense to which the sign of the speed refers; by default the present one
+        """
+        self._speed = speed if sense is None or sense == self._sense else 0.0 - speed
+        self._rests = self._stops = False
 
     def set_backing(self, backs: bool) -> None:
         """Set whether a positive speed moves the actor against its heading, as on a trajectory with such headings."""
         self._backs, self._rests = backs, False
+
+    def leave_curve(self, *, after_step: bool) -> None:
+        """Let the speed refer to the heading, at once or after the current step, which is on the trajectory.
+
+        The actor continues its motion: where it moves against its heading, the sense of its speed is inverted.
+        """
+        self._leaves_curve = after_step
+        if not after_step:
+            if self._backs:
+                self._sense = -self._sense
+            self._speed, self._backs, self._rests = self.speed_along_heading, False, False
 
     def set_route(self, route: Route | None, branch_selector: BranchSelector | None = None) -> None:
         """Set the route, and the selector of branches at junctions that the route does not cover."""
@@ -169,7 +186,10 @@ class Motion(MotionState):
         distance = self._speed * dt if lane_distance is None else lane_distance
         if self._teleport:
             self._teleport = False
-            return self.placement()
+            placement = self.placement()
+            if self._leaves_curve:
+                self.leave_curve(after_step=False)
+            return placement
         if self._route is not None and self._route_lanes is not None:
             if steering is None and target is None and lane_distance is None and distance > 0.0 and not self._crosses:
                 steering = self._step_towards_route(distance)
@@ -192,6 +212,8 @@ class Motion(MotionState):
         x, y, z, h, p, r = self._pose
         across = distance == 0.0 or target is not None or lane_distance is not None
         speed = self.speed_along_heading
+        if self._leaves_curve:
+            self.leave_curve(after_step=False)
         return Placement(x, y, z, h, p, r, speed, target is not None and self._teleported, across)
 
     def placement(self, *, teleport: bool = True) -> Placement:

@@ -30,6 +30,7 @@ class MotionState:
         self._heading = 0.0
         self._speed = 0.0
         self._backs = False
+        self._sense = 1
         self._route: Route | None = None
         self._branch_selector: BranchSelector | None = None
         self._end_of_road = False
@@ -67,6 +68,11 @@ class MotionState:
     def speed_along_heading(self) -> float:
         """Speed along the heading [m/s], as views and frames have it."""
         return 0.0 - self._speed if self._backs else self._speed
+
+    @property
+    def sense(self) -> int:
+        """Sense of the sign of the speed, 1 or -1: it is inverted at the end of a trajectory with other headings."""
+        return self._sense
 
     @property
     def route(self) -> Route | None:
