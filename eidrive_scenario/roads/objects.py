@@ -94,11 +94,9 @@ def _pose(network: RoadNetwork, road_object: RoadObject, s: float, t: float, z_o
 
 def _repeated(network: RoadNetwork, road_object: RoadObject) -> Iterator[PlacedObject]:
     for repeat in road_object.repeats:
-        gapless = repeat.distance <= 0.0
+        gapless = repeat.distance <= 0.0 < repeat.length
         step = min(LONGEST_PART, repeat.length) if gapless else repeat.distance
-        if step <= 0.0:
-            continue
-        ratio = repeat.length / step
+        ratio = repeat.length / step if step > 0.0 else 0.0  # a repetition without extent is a single object
         count = max(math.ceil(ratio), 1) if gapless else math.floor(ratio + EPSILON) + 1
         part = repeat.length / count if gapless else step
         for i in range(count):
