@@ -194,6 +194,7 @@ TAKEN_BY_CLASS = {
 """Elements whose children the engine selects by class, not by the name of the field."""
 
 
+@cache
 def marked_tests() -> dict[str, list[str]]:
     """Return the sorted tests with the mark of each name, as `file::function`."""
     found: dict[str, set[str]] = defaultdict(set)
