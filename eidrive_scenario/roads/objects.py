@@ -94,9 +94,11 @@ def _pose(network: RoadNetwork, road_object: RoadObject, s: float, t: float, z_o
 
 def _repeated(network: RoadNetwork, road_object: RoadObject) -> Iterator[PlacedObject]:
     for repeat in road_object.repeats:
-        gapless = repeat.distance <= 0.0 < repeat.length
+        gapless = repeat.distance <= 0.0
         step = min(LONGEST_PART, repeat.length) if gapless else repeat.distance
-        ratio = repeat.length / step if step > 0.0 else 0.0  # a repetition without extent is a single object
+        if step <= 0.0:
+            continue
+        ratio = repeat.length / step
         count = max(math.ceil(ratio), 1) if gapless else math.floor(ratio + EPSILON) + 1
         part = repeat.length / count if gapless else step
         for i in range(count):

@@ -193,15 +193,6 @@ def test_last_repetition_at_a_multiple_of_the_distance_is_placed(length: float, 
     assert placed[-1].pose.x == pytest.approx(10.0 + length)
 
 
-@pytest.mark.parametrize("distance", ["0", "5"])
-def test_repetition_without_extent_is_a_single_object(distance: str) -> None:
-    """The object has its own length, as no part of a continuous object has a length."""
-    repeat = f'<repeat s="10" length="0" distance="{distance}" tStart="4" tEnd="6"/>'
-    objects = f'<objects><object id="1" s="0" t="5" length="3" width="2" height="1">{repeat}</object></objects>'
-    (placed,) = placed_objects(RoadNetwork.parse(map_xml(road_xml(extra=objects))))
-    assert (*placed.pose[:2], placed.length, placed.width) == (10.0, 4.0, 3.0, 2.0)
-
-
 def test_cycle_lanes_in_junctions_are_below_driving_lanes() -> None:
     both = (
         '<laneSection s="0"><center><lane id="0"/></center><right>'
