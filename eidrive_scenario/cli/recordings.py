@@ -26,7 +26,7 @@ def judge(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object per recording only.")] = False,
 ) -> None:
-    """Judge recorded runs again, with their own criteria or with other ones; several in one table.
+    """Judge recorded runs again, with their own or other criteria, several in one table.
 
     Example: eidrive judge reports/scenario_1 --criterion '{max_speed: {of: Ego, at_most: 10}}'
 
