@@ -307,9 +307,9 @@ def quoted(value: object, length: int = 200) -> str:
     return shortened(repr(value), length * 2)
 
 
-def counted(number: int, noun: str) -> str:
-    """Return a number with its noun, such as `1 run` and `2 runs`; the plural adds an s to the last word."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+def counted(number: int, noun: str, plural: str = "") -> str:
+    """Return a number with its noun, such as `1 run` and `2 runs`; by default the plural adds an s to the last word."""
+    return f"{number} {noun}" if number == 1 else f"{number} {plural or noun + 's'}"
 
 
 def most_similar(word: str, candidates: Collection[str]) -> str | None:

@@ -243,7 +243,7 @@ class SummedCriterion(FollowedCriterion):
         elif self._first is None:
             reason = f"{self.of} never {self.state}"
         else:
-            amount = f"{self._sum:.2f} {self.unit}" if self.unit else f"{counted(round(self._sum), 'time')}"
+            amount = f"{self._sum:.2f} {self.unit}" if self.unit else counted(round(self._sum), "time")
             reason = f"{self.of} {self.state}: {amount}, first at {self._first:.2f} s"
         return self.conclude(
             self.was_present and self._violated is None,

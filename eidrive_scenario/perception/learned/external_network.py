@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Floats
-from eidrive_scenario.errors import Diagnostic, SettingError, quoted
+from eidrive_scenario.errors import Diagnostic, SettingError, counted, quoted
 from eidrive_scenario.perception.learned.image_network import Candidates, ImageNetwork
 from eidrive_scenario.perception.learned.runtimes import (
     AUTO,
@@ -77,7 +77,7 @@ class ExternalNetwork(ImageNetwork):
             return self._candidates(outputs)
         except (ValueError, IndexError) as error:
             shapes = ", ".join(str(output.shape) for output in outputs)
-            expected = f"{self._layout!r} for {len(self.classes)} class{'es' * (len(self.classes) != 1)}"
+            expected = f"{self._layout!r} for {counted(len(self.classes), 'class', 'classes')}"
             message = f"weights {quoted(str(self._path))} return {shapes}, which is not {expected}: {error}"
             raise SettingError(Diagnostic(message, f"layouts: {LAYOUTS}")) from error
 

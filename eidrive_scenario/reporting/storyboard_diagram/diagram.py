@@ -5,6 +5,7 @@ from __future__ import annotations
 from html import escape
 from pathlib import Path
 
+from eidrive_scenario.errors import counted
 from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.reporting.storyboard_diagram.layout import (
     GAP,
@@ -81,7 +82,7 @@ _DEFINITIONS = (
 def _head(storyboard: Storyboard, width: float) -> tuple[list[str], float]:
     scenario = storyboard.scenario
     version = ".".join(map(str, scenario.version))
-    count = "1 entity" if len(scenario.entities) == 1 else f"{len(scenario.entities)} entities"
+    count = counted(len(scenario.entities), "entity", "entities")
     parts = [
         _text(MARGIN, MARGIN + 18, scenario.name, size=22, weight=700),
         _text(MARGIN, MARGIN + 37, f"OpenSCENARIO {version}, {count}", color=MUTED),

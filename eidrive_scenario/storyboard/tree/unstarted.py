@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from eidrive_scenario.errors import Diagnostic
+from eidrive_scenario.errors import Diagnostic, counted
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.diagnostics import Location
 from eidrive_scenario.openscenario.validation.names import StoryboardNames
@@ -46,7 +46,7 @@ def unstarted(root: StoryElement, scenario: Scenario, time: float, end: str) -> 
         )
     if len(elements) > _MAX_REPORTED:
         remaining = len(elements) - _MAX_REPORTED
-        message = f"{remaining} more {'act or event' if remaining == 1 else 'acts and events'} never started"
+        message = f"{counted(remaining, 'more act or event', 'more acts and events')} never started"
         diagnostics.append(
             Diagnostic(message, "eidrive run --log - prints the elements that started", str(scenario.path or ""))
         )
