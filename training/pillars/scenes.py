@@ -27,8 +27,10 @@ SELDOM_FIELDS = (*(360.0,) * 6, 180.0, 110.0, 100.0)
 """Fields of view of the others [degrees]."""
 _SPREAD = 60.0
 """Maximum distance of road users from the receiver [m]."""
-_FASTEST = (15.0, 50.0)
-"""Speed of the fastest motor vehicles in scenes of towns and of motorways [m/s]."""
+_FASTEST = (15.0, 15.0, 50.0)
+"""Speed of the fastest motor vehicles in scenes of towns, twice, and of motorways [m/s]."""
+_ROWS = 0.3
+"""Share of the scenes with a row of equal vehicles: in two scans, a standing row looks like a fast one."""
 _ODDS = {
     0: {"car": 0.52, "van": 0.1, "ambulance": 0.03, "truck": 0.1, "firetruck": 0.04, "bus": 0.07, "motorbike": 0.06,
         "bicycle": 0.05, "pedestrian": 0.03},
@@ -139,6 +141,20 @@ class SceneMaker:
             scale = tuple(rng.uniform(0.95, 1.05, 3).tolist()) if shape != "rsu" else (1.0, 1.0, 1.0)
             return add(mesh, x, y, heading, 0.0 if stands else float(rng.uniform(0.5, fastest)), scale)
 
+        def add_row(lane: int, shape: str) -> None:
+            x, y, heading = lanes[lane, :3].tolist()
+            mesh = int(rng.choice(self._shapes[shape]))
+            abreast = rng.random() < 0.25
+            step = float(assets.sizes[mesh, 1 if abreast else 0] + rng.uniform(0.5, 5.0))
+            direction = heading + (math.pi / 2.0 if abreast else 0.0)
+            speed = 0.0 if abreast or rng.random() < 0.7 else float(rng.uniform(0.5, pace))
+            for number in range(int(rng.integers(3, 9))):
+                aside, turn = float(rng.normal(0.0, 0.1)), float(rng.normal(0.0, 0.02))
+                along = number * step + float(rng.normal(0.0, 0.1))
+                add(mesh, x - center[0] + along * math.cos(direction) - aside * math.sin(direction),
+                    y - center[1] + along * math.sin(direction) + aside * math.cos(direction),
+                    heading + turn, speed, (1.0, 1.0, 1.0))  # fmt: skip
+
         stations = []
         for number in range(STATIONS):
             mast = number > 0 and rng.random() < 0.45
@@ -181,6 +197,8 @@ class SceneMaker:
                 stations.append((-1, x, y, 6.0, float(angle), 0.0, 0.0, math.pi))
         weight = np.where(lanes[near, 4] == 0, 1.0, 0.5) * np.exp(-away[near] / float(rng.choice([15.0, 30.0, 1e3])))
         weight /= weight.sum()
+        if rng.random() < _ROWS:
+            add_row(int(rng.choice(near, p=weight)), str(rng.choice(["car", "van", "ambulance", "truck", "bus"])))
         for chosen in rng.choice(near, int(rng.integers(4, 46)), p=weight).tolist():
             odds = _ODDS[int(lanes[chosen, 4])]
             shape = str(rng.choice(list(odds), p=np.array(list(odds.values())) / sum(odds.values())))

@@ -290,7 +290,7 @@ def evaluate(network: Pillars, sampler: Sampler, arguments: argparse.Namespace) 
 
 
 def main() -> None:
-    """Train one stage, and write its state, and after the second stage the weights."""
+    """Train one stage, and write its state, and after a stage of fusion the weights."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("stage", choices=("single", "fusion"))
     parser.add_argument("--minutes", type=float, default=8.0)
