@@ -254,6 +254,7 @@ class BehaviorPlanner(RoutePlanner):
         near = [known_objects[index] for index in indexes]
         stop = self._stop(line.path, ego, x, y, now)
         passages = tuple(passage for passage in self._passages if passage.end > s)
+        gives_way, defers = self._precedence(passages)
         limits, hidden = self._caution(ego, objects, line, s, wanted, now)
         low = line.index_at(s - MARGIN_AHEAD)
         high = line.index_at(s + way + MARGIN_AHEAD) + 1
@@ -269,25 +270,28 @@ class BehaviorPlanner(RoutePlanner):
             speed=max(ego.speed, 0.0),
             wanted=wanted,
             objects=near,
-            prediction=self._predictor.predict(near, [lanes[index] for index in indexes]),
+            prediction=self._predictor.predict(near, [lanes[index] for index in indexes], defers),
             window=(low, max(high, low + 2)),
             stop=None if stop is None else Wall(line.along_of(stop.along), math.inf, stop.reason),
             now=now,
-            gives_way=self._gives_way(passages),
+            gives_way=gives_way,
             hidden=hidden,
             change=self._change(line, s),
             passages=passages,
         )
         return self._decider.decide(situation)
 
-    def _gives_way(self, passages: Sequence[Passage]) -> Callable[[Passage], bool] | None:
-        """Return a function that determines whether a vehicle with these passages ahead gives way to traffic on another
-        one."""
+    def _precedence(self, passages: Sequence[Passage]) -> tuple[Callable[[Passage], bool] | None, ...]:
+        """Return functions of a passage of another vehicle: whether a vehicle with these passages ahead gives way to
+        it, and whether it gives way to that vehicle; None: there are no junctions."""
         rules = self._rules
         ahead = {passage.junction: passage for passage in reversed(passages)}
         if rules is None or not ahead:
-            return None
-        return lambda other: other.junction in ahead and rules.gives_way(ahead[other.junction], other)
+            return None, None
+        return (
+            lambda other: other.junction in ahead and rules.gives_way(ahead[other.junction], other),
+            lambda other: other.junction in ahead and rules.gives_way(other, ahead[other.junction]),
+        )
 
     def _in_view(self, ego: EgoState) -> Callable[[Sequence[KnownObject]], Bools] | None:
         """Return a function that determines which objects are in view of the sensors; None: all of them."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import msgspec
@@ -99,16 +100,22 @@ class Predictor:
                     known_object.vx, known_object.vy = speed * math.cos(heading), speed * math.sin(heading)
                     break
 
-    def predict(self, objects: list[KnownObject], lanes: list[list[Course]] | None = None) -> Prediction:
+    def predict(
+        self,
+        objects: list[KnownObject],
+        lanes: list[list[Course]] | None = None,
+        defers: Callable[[Passage], bool] | None = None,
+    ) -> Prediction:
         """Return the hypotheses of all objects.
 
-        lanes  courses of the lanes on which each of them is, if they are known already
+        lanes   courses of the lanes on which each of them is, if they are known already
+        defers  returns whether traffic on a passage of a junction gives way to the ego; None: there are no junctions
         """
         lanes = self.lanes(objects) if lanes is None else lanes
         owners: list[int] = []
         hypotheses: list[Hypothesis] = []
         for index, (known_object, courses) in enumerate(zip(objects, lanes, strict=True)):
-            new = self._hypotheses(known_object, courses)
+            new = self._hypotheses(known_object, courses, defers)
             owners += [index] * len(new)
             hypotheses += new
         if not hypotheses:
@@ -146,7 +153,9 @@ class Predictor:
             z[free] = heights.reshape(len(free), -1)
         return z
 
-    def _hypotheses(self, known_object: KnownObject, courses: list[Course]) -> list[Hypothesis]:
+    def _hypotheses(
+        self, known_object: KnownObject, courses: list[Course], defers: Callable[[Passage], bool] | None
+    ) -> list[Hypothesis]:
         times, now = self._times, known_object.speed
         if now < STANDING or known_object.seems_to_stand:
             motion = np.array([known_object.x, known_object.y, known_object.yaw, 0.0])
@@ -159,6 +168,10 @@ class Predictor:
         leaving: list[Hypothesis] = []
         """Along lanes that the vehicle leaves, crosses or is beside of: only if it follows no lane."""
         followed: list[Course] = []
+        deferring: list[bool] = []
+        """Whether those that follow lanes give way to the ego."""
+        is_steady = False
+        """Whether the vehicle follows one of the others without any sign of a turn."""
         direction = math.atan2(known_object.vy, known_object.vx)
         noise = known_object.speed_error
         # A vehicle that accelerates does so until its driver reacts to a curve.
@@ -177,6 +190,7 @@ class Predictor:
             aside = now * math.sin(turn)
             offset: float | Array = left
             wandering = max(LEAVING_RATE, LEAVING_ERROR * known_object.error)
+            has_turned = abs(aside) > wandering
             in_junction = any(passage.start <= along <= passage.end for passage in course.passages)
             if in_junction:
                 wandering = max(wandering, CUTTING * now)
@@ -201,9 +215,14 @@ class Predictor:
             fitting.append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead, z))
             if fitting is following:
                 followed.append(course)
+                deferring.append(defers is not None and any(map(defers, ahead)))
+                is_steady |= not (deferring[-1] or has_turned)
             if len(following) == MOST_HYPOTHESES:
                 break
         known_object.followed = followed
+        if is_steady:
+            # It turns before the ego only if it shows so.
+            following = [hypothesis for hypothesis, waits in zip(following, deferring, strict=True) if not waits]
         return following or too_fast or leaving[:MOST_HYPOTHESES] or [_straight_on(known_object, travelled, speed)]
 
     def lanes(self, objects: list[KnownObject]) -> list[list[Course]]:

@@ -232,6 +232,17 @@ def test_turn_that_is_faster_than_usual_is_predicted_once_it_shows() -> None:
     assert (prediction.y[:, -1] < -20.0).any()
 
 
+@pytest.mark.parametrize(("turned", "expected"), [(0.0, False), (0.03, False), (0.1, True)])
+def test_turn_that_gives_way_is_predicted_once_it_shows(turned: float, expected: bool) -> None:
+    """At 6 m/s, 0.03 rad off the lane straight ahead is wandering (0.18 m/s to the side), and 0.1 rad a turn."""
+    roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
+    yaw = math.pi + turned
+    box = KnownBox(53.0, 3.5, 6.0 * math.cos(yaw), 6.0 * math.sin(yaw), yaw=yaw)
+    prediction = Predictor(roads, TIMES).predict(known(box), defers=lambda passage: passage.turn > 1.0)
+    assert (prediction.y[:, -1] < -20.0).any() == expected
+    assert (np.abs(prediction.y[:, -1] - 3.5) < 0.5).any()
+
+
 @pytest.mark.parametrize(("acceleration", "turns"), [(0.0, True), (1.0, False)])
 def test_vehicle_that_accelerates_beyond_the_speed_of_a_turn_does_not_turn(acceleration: float, turns: bool) -> None:
     """The left turn of a radius of 10 m, passed with 6.3 m/s (4 m/s²), is 8 m after the place of the oncoming car.

@@ -9,8 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from opendrive_xml import road_xml
+from planned_drive import KnownBox, PlannedDrive, behavior
+from signal_street import CAR
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import distances_along, footprint_distance
 from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules, Passage
 from eidrive_scenario.roads import RoadNetwork
 
@@ -156,3 +159,45 @@ def test_stop_sign_is_on_the_ways_that_it_controls() -> None:
     # From y = 60 m to the sign at s = 0.5 m of a road that begins at y = 12.8 m.
     assert place == pytest.approx(60.0 - 13.3, abs=1.0)
     assert rules("t_junction").stops_along(way("t_junction", "west", "east")) == ()
+
+
+@pytest.mark.parametrize("speed", [8.0, 12.0])
+@pytest.mark.parametrize("other_speed", [5.0, 8.0])
+def test_vehicle_with_the_right_of_way_does_not_brake_for_oncoming_traffic(speed: float, other_speed: float) -> None:
+    """A car comes towards the vehicle and drives straight on. It could turn left, but would have to give way."""
+    roads = RoadNetwork.load(ROADS / "four_way_junction.xodr")
+    run = PlannedDrive(behavior(roads, speed), roads, speed=speed, start=-30.0, y=0.0)
+    # Both are in the middle of the junction at the same time.
+    start = 42.0 + 72.0 / speed * other_speed
+    run.run(100.0 / speed, lambda now: [KnownBox(start - other_speed * now, 3.5, vx=-other_speed, yaw=math.pi)])
+    run.world.close()
+    assert min(run.speeds) > speed - 0.1
+
+
+@pytest.mark.parametrize("speed", [4.0, 6.0])
+def test_vehicle_with_priority_stops_for_a_car_that_turns_before_it(speed: float) -> None:
+    """The car begins the turn 2 s before the vehicle would enter the junction."""
+    roads = RoadNetwork.load(ROADS / "four_way_junction.xodr")
+    turn = way("four_way_junction", "east", "south")
+    along = distances_along(turn)
+    begin = float(np.interp(-55.0, -turn[:, 0], along))
+
+    def car(now: float) -> list[KnownBox]:
+        place = begin + speed * (now - (59.0 / 8.0 - 2.0))
+        x, y = (float(np.interp(place, along, values)) for values in turn.T)
+        ahead = [float(np.interp(place + 1.0, along, values)) for values in turn.T]
+        yaw = math.atan2(ahead[1] - y, ahead[0] - x)
+        return [KnownBox(x, y, speed * math.cos(yaw), speed * math.sin(yaw), yaw=yaw)]
+
+    run = PlannedDrive(behavior(roads, 8.0), roads, speed=8.0, start=-30.0, y=0.0)
+    run.run(14.0, car)
+    run.world.close()
+    gaps = [
+        footprint_distance(
+            (x + CAR.offset[0], y, 0.0, *CAR.size, 0.0), (other.x, other.y, 0.0, *other.size, 1.0, other.yaw)
+        )
+        for number, (x, y, _) in enumerate(run.path)
+        for other in car(number * 0.05)
+    ]
+    assert min(gaps) > 0.2
+    assert run.path[-1][0] > 29.0
