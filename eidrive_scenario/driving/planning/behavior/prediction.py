@@ -168,14 +168,13 @@ class Predictor:
         leaving: list[Hypothesis] = []
         """Along lanes that the vehicle leaves, crosses or is beside of: only if it follows no lane."""
         followed: list[Course] = []
-        deferring: list[bool] = []
-        """Whether those that follow lanes give way to the ego."""
-        is_steady = False
-        """Whether the vehicle follows one of the others without any sign of a turn."""
+        deviations: list[tuple[float, bool]] = []
+        """Lateral speeds from the lanes that it follows [m/s], and whether it would give way to the ego on them."""
         direction = math.atan2(known_object.vy, known_object.vx)
         noise = known_object.speed_error
         # A vehicle that accelerates does so until its driver reacts to a curve.
         soon = now + max(known_object.acceleration, 0.0) * PERCEPTION - noise
+        steady = max(LEAVING_RATE, LEAVING_ERROR * known_object.error)
         for course in courses:
             along, left, heading = course.project(known_object.x, known_object.y)
             turn = float(wrap_angle(direction - heading))
@@ -189,11 +188,8 @@ class Predictor:
                 continue
             aside = now * math.sin(turn)
             offset: float | Array = left
-            wandering = max(LEAVING_RATE, LEAVING_ERROR * known_object.error)
-            has_turned = abs(aside) > wandering
             in_junction = any(passage.start <= along <= passage.end for passage in course.passages)
-            if in_junction:
-                wandering = max(wandering, CUTTING * now)
+            wandering = max(steady, CUTTING * now) if in_junction else steady
             is_inside = abs(left) <= course.half_width + known_object.error
             # Else the prediction alternates where a turn is near a limit.
             keeps = (
@@ -215,14 +211,17 @@ class Predictor:
             fitting.append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead, z))
             if fitting is following:
                 followed.append(course)
-                deferring.append(defers is not None and any(map(defers, ahead)))
-                is_steady |= not (deferring[-1] or has_turned)
+                deviations.append((abs(aside), defers is not None and any(map(defers, ahead))))
             if len(following) == MOST_HYPOTHESES:
                 break
         known_object.followed = followed
-        if is_steady:
-            # It turns before the ego only if it shows so.
-            following = [hypothesis for hypothesis, waits in zip(following, deferring, strict=True) if not waits]
+        # It is expected to turn before the ego only if it leaves its lane, in the direction of the turn.
+        least = min((deviation for deviation, waits in deviations if not waits), default=math.inf)
+        following = [
+            hypothesis
+            for hypothesis, (deviation, waits) in zip(following, deviations, strict=True)
+            if not waits or least > max(steady, deviation)
+        ]
         return following or too_fast or leaving[:MOST_HYPOTHESES] or [_straight_on(known_object, travelled, speed)]
 
     def lanes(self, objects: list[KnownObject]) -> list[list[Course]]:

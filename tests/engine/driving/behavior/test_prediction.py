@@ -232,9 +232,9 @@ def test_turn_that_is_faster_than_usual_is_predicted_once_it_shows() -> None:
     assert (prediction.y[:, -1] < -20.0).any()
 
 
-@pytest.mark.parametrize(("turned", "expected"), [(0.0, False), (0.03, False), (0.1, True)])
+@pytest.mark.parametrize(("turned", "expected"), [(0.0, False), (0.03, False), (0.1, True), (-0.1, False)])
 def test_turn_that_gives_way_is_predicted_once_it_shows(turned: float, expected: bool) -> None:
-    """At 6 m/s, 0.03 rad off the lane straight ahead is wandering (0.18 m/s to the side), and 0.1 rad a turn."""
+    """At 6 m/s, 0.03 rad off the lane straight ahead is wandering (0.18 m/s), and 0.1 rad to the left is a turn."""
     roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
     yaw = math.pi + turned
     box = KnownBox(53.0, 3.5, 6.0 * math.cos(yaw), 6.0 * math.sin(yaw), yaw=yaw)
