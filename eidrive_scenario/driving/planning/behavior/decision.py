@@ -525,12 +525,13 @@ class Decider:
             waits_at = situation.outside_junctions(waits_at)
             waits = situation.speed < AT_REST and waits_at - situation.s < NEAR_PLACE
             if waits and may_pass(situation, scene):
-                has_place_with_view = situation.steered[0] - NEAR_PLACE < profile.waits_at < math.inf
-                is_last_place = not has_place_with_view
-                is_free = self._oncoming.yields(outlook, viewpoint, is_last_place=is_last_place)
+                # A new profile has no place with a view if the vehicle is at that of the current one.
+                places = (profile.waits_at, math.inf if self._current is None else self._current.waits_at)
+                has_view = any(situation.steered[0] - NEAR_PLACE < place < math.inf for place in places)
+                is_free = self._oncoming.yields(outlook, viewpoint, is_last_place=True, has_view=has_view)
                 verdict = Verdict.GO if is_free else verdict
         elif verdict is Verdict.FOLLOW:
-            if self._oncoming.yields(outlook, viewpoint, is_last_place=False):
+            if self._oncoming.yields(outlook, viewpoint, is_last_place=False, has_view=True):
                 return profile, Verdict.GO, waits_at
             lateral = self._settings.lateral_acceleration
             edge = towards(profile.name, profile.edge, situation.start, lateral, profile.side)

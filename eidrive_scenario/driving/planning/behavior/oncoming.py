@@ -35,7 +35,7 @@ did, or as the vehicle wants to, instead of at the speed limit [s]; of the order
 Capacity Manual (4.1 to 7.5 s)."""
 LONG, LONGEST = 2, 4
 """Number of pauses without oncoming traffic after which the vehicle relies on others to respond; and after which it
-begins behind a standing object without a place to see from: it would wait forever. A choice."""
+begins behind a standing object from where it does not see far enough: it would wait forever. A choice."""
 RARE, MOST_HEADWAYS = 0.025, 2.0
 """Probability of a headway after which no further vehicle is expected, and its maximum over the longest one until then:
 few say little about the next one."""
@@ -298,11 +298,12 @@ class OncomingTraffic:
             since, observer = time, s
         return Verdict.GO
 
-    def yields(self, outlook: Outlook, viewpoint: tuple[float, float], *, is_last_place: bool) -> bool:
+    def yields(self, outlook: Outlook, viewpoint: tuple[float, float], *, is_last_place: bool, has_view: bool) -> bool:
         """Return whether a vehicle that has waited in vain for a view may begin, since traffic that comes into view can
         stop before it.
 
         is_last_place  whether there is no other place to wait at
+        has_view       whether the vehicle waits at a place with a view, where it waits longer
         """
         hidden = self.first_hidden(outlook, viewpoint)
         front = viewpoint[0] + self._body.half_length
@@ -310,7 +311,7 @@ class OncomingTraffic:
         way = approach(self._usual, math.inf)
         if has_waited_long:
             way = approach(min(self._usual, self._wanted), math.inf, HARD_RESPONSE)
-        is_patient = has_waited_long or (is_last_place and self._is_patient(outlook.now))
+        is_patient = has_waited_long or (is_last_place and not has_view and self._is_patient(outlook.now))
         waits_in_vain = is_last_place and self._is_patient(outlook.now, LONGEST)
         self._others_yield = waits_in_vain or (is_patient and hidden - way >= front)
         return self._others_yield

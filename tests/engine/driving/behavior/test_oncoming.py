@@ -242,7 +242,17 @@ def test_vehicle_without_any_view_begins_after_two_long_pauses(is_last_place: bo
     waiting = traffic(100.0)
     there = scene((6.3 + 2.5, 0.0, 0.0))
     for now, expected in ((13.0, False), (23.9, False), (24.0, is_last_place)):
-        assert waiting.yields(Outlook(LINE, there, BESIDE, now), (1.4, 0.0), is_last_place=is_last_place) is expected
+        outlook = Outlook(LINE, there, BESIDE, now)
+        assert waiting.yields(outlook, (1.4, 0.0), is_last_place=is_last_place, has_view=False) is expected
+
+
+@pytest.mark.parametrize(("has_view", "since"), [(False, PAUSE), (True, 2.0 * PAUSE)])
+def test_vehicle_with_a_view_relies_on_others_after_two_pauses(has_view: bool, since: float) -> None:
+    """Within 100 m traffic at 10 m/s, which needs 10 m + 100 / 6 m, can stop."""
+    waiting = traffic(100.0)
+    for now, expected in ((since - 0.1, False), (since, True)):
+        outlook = Outlook(LINE, scene(), BESIDE, now)
+        assert waiting.yields(outlook, (1.4, 0.0), is_last_place=True, has_view=has_view) is expected
 
 
 @pytest.mark.parametrize("kind", ["bidirectional", "driving"])

@@ -11,6 +11,7 @@ from opendrive_xml import map_xml, road_xml
 from planned_drive import LANE, KnownBox, PlannedDrive, behavior, two_lane_road
 from signal_street import CAR
 
+from eidrive_scenario.base.coverage import ViewSector
 from eidrive_scenario.driving.planning.behavior.proposals import Start, change_length, passing
 from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.roads import RoadNetwork
@@ -160,6 +161,29 @@ def test_standing_bus_is_passed_with_one_meter_between() -> None:
     beside = [y for x, y, _ in run.path if 114.0 < x < 126.0]
     assert min(beside) - CAR.size[1] / 2.0 - (LANE + 1.25) > 1.0
     assert run.front > 180.0
+
+
+def test_vehicle_at_a_place_with_a_view_begins_after_two_pauses() -> None:
+    """An oncoming car passes while the vehicle approaches; then none comes within 60 m for 2 · 6 s."""
+    bus = KnownBox(130.0, LANE - 0.6, kind="bus", size=(11.0, 2.5))
+    roads = two_lane_road()
+    planner = behavior(roads)
+    planner.view = (ViewSector(0.0, 0.0, 1.8, 0.0, math.pi, 60.0),)
+    run = PlannedDrive(planner, roads, speed=8.0)
+    in_view: list[float] = []
+
+    def objects(now: float) -> list[KnownBox]:
+        x = run.path[-1][0] if run.path else 20.0
+        car = KnownBox(150.0 - 12.0 * now, -LANE, vx=-12.0, yaw=math.pi)
+        near = [other for other in (bus, car) if -10.0 < other.x - other.size[0] / 2.0 - x < 60.0]
+        in_view.extend([now] if car in near else [])
+        return near
+
+    run.run(32.0, objects)
+    run.world.close()
+    begins = next(0.05 * tick for tick, (_, y, _) in enumerate(run.path) if y > LANE + 0.8)
+    assert in_view[-1] + 12.0 < begins < in_view[-1] + 12.0 + 4.0
+    assert run.front > 150.0
 
 
 def test_vehicle_that_appears_nearer_than_the_place_with_a_view_passes() -> None:
