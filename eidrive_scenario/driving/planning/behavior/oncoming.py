@@ -37,10 +37,8 @@ LONG, LONGEST = 2, 4
 """Number of pauses without oncoming traffic after which the vehicle relies on others to respond; and after which it
 begins behind a standing object from where it does not see far enough: it would wait forever. A choice."""
 RARE, MOST_HEADWAYS = 0.025, 2.0
-"""Probability of a headway after which no further vehicle is expected, and its maximum over the longest one until then:
-few say little about the next one."""
-QUIET = 2.0
-"""Time without traffic over the time in which some could come unseen, from which on none is expected; a choice."""
+"""Probability up to which a further vehicle is not expected, and maximum of the headway from which on it is that small
+over the longest one until then: few say little about the next one."""
 LEAST_HEADWAY = 1.0
 """Difference between expected arrivals that belong to different vehicles [s]."""
 SLOWEST = 0.5
@@ -327,11 +325,15 @@ class OncomingTraffic:
     def _is_over(self, hidden: float, viewpoint: float, duration: float, end: float, now: float) -> bool:
         """Return whether no more traffic is expected from beyond the range of the sensors at `viewpoint`, where nothing
         else hides it: after the pause, and after traffic not before a time without any that is long against that in
-        which some could come to `end` unseen."""
+        which some could come to `end` unseen.
+
+        If vehicles come at random with an unknown rate, a time t without one after the last is followed by a time u
+        with one with the probability u / (t + u).
+        """
         if not self._is_patient(now) or not self._is_in_view(hidden, viewpoint):
             return False
         unseen = duration - (hidden - end) / max(self._usual, ONCOMING_SPEED)
-        return math.isinf(self._last) or self._quiet(now) >= QUIET * unseen
+        return math.isinf(self._last) or unseen <= RARE * (self._quiet(now) + unseen)
 
     def _is_in_view(self, hidden: float, viewpoint: float) -> bool:
         """Return whether nothing but the range of the sensors limits the view from `viewpoint`."""

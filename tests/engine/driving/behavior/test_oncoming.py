@@ -173,6 +173,18 @@ def test_view_has_to_suffice_for_the_maneuver(view: float, now: float, expected:
     assert verdict(view=view, now=now) is expected
 
 
+@pytest.mark.parametrize(("quiet", "expected"), [(120.0, Verdict.WAIT), (160.0, Verdict.GO)])
+def test_traffic_is_over_if_the_next_vehicle_is_improbable(quiet: float, expected: Verdict) -> None:
+    """From -13.6 m on, for 11 - 1.5 s, traffic at 8 m/s comes from 130 m farther to 68.8 m in 6 s: it can be unseen for
+    3.5 s. With an unknown rate it comes then with a probability of 2.5 % after 39 times as long without traffic."""
+    observed = OncomingTraffic(130.0, TIMES, BODY, SETTINGS)
+    observed.observe(scene((100.0, 3.5, -8.0)), 0.0, 10.0, 0.0, held_up=True)
+    observed.observe(scene(), 0.0, 10.0, quiet, held_up=True)
+    motion = Motion(-30.0 + 10.0 * TIMES, np.full(len(TIMES), 10.0))
+    outlook = Outlook(LINE, scene((40.0, 0.0, 0.0)), BESIDE, quiet)
+    assert observed.verify(PASSING, motion, outlook, is_current=False) is expected
+
+
 def test_moving_object_is_followed_until_the_view_suffices() -> None:
     assert verdict((30.0, 0.0, 4.0), view=40.0) is Verdict.FOLLOW
     # 7.5 m along the line, the vehicle is 0.75 m beyond the border, and can still return behind the object.
