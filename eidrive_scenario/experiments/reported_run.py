@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from eidrive_scenario.errors import Diagnostic, InputError, quoted
 from eidrive_scenario.evaluation.criterion import Verdict
-from eidrive_scenario.simulation.result import typed
+from eidrive_scenario.simulation.result import typed_parameters
 from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
 
 _OF_REPORT = ("folder", "replay", "axes", "sweep")
@@ -56,7 +56,8 @@ class ReportedRun(BaseModel):
         """Return the value of an axis of a sweep or of a parameter, as a number if it is one; None without it."""
         if name in self.axes:
             return self.axes[name]
-        return typed(self.parameters[name]) if name in self.parameters else None
+        strings = self.settings.get("strings")
+        return typed_parameters(self.parameters, strings if isinstance(strings, list) else ()).get(name)
 
     @property
     def is_swept(self) -> bool:

@@ -117,6 +117,13 @@ class Scenario:
         assert self.document.storyboard is not None
         return self.document.storyboard
 
+    @property
+    def parameter_types(self) -> dict[str, model.ParameterType]:
+        """Return the types of the parameters by name."""
+        declared = self.document.parameter_declarations
+        declarations = () if declared is None else declared.parameter_declaration
+        return {parameter.name: parameter.parameter_type for parameter in declarations}
+
     @cached_property
     def custom_commands(self) -> tuple[model.CustomCommandAction, ...]:
         """Return all CustomCommandActions of the storyboard in the order of the file."""

@@ -192,8 +192,7 @@ def scenario_metadata(scenario: Scenario) -> dict[str, str]:
     if there are vehicles, `EXTERNAL_OBJECTS` if there are any, and `BODIES`.
     """
     metadata = {CONTEXT: canonical_json(codec(CriteriaContext).encode(criteria_context(scenario)))}
-    if (declared := scenario.document.parameter_declarations) is not None:
-        types = {parameter.name: parameter.parameter_type.value for parameter in declared.parameter_declaration}
+    if types := {name: kind.value for name, kind in scenario.parameter_types.items()}:
         metadata[PARAMETER_TYPES] = canonical_json(types)
     vehicles = {name: entity for name, entity in scenario.entities.items() if isinstance(entity, Vehicle)}
     towed = (VehicleCategory.TRAILER, VehicleCategory.SEMITRAILER)

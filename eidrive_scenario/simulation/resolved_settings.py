@@ -16,6 +16,7 @@ from eidrive_scenario.extensions.library import name_of
 from eidrive_scenario.extensions.registry import distributions
 from eidrive_scenario.files.bounded import is_regular_file, read_regular_file, reason_of
 from eidrive_scenario.openscenario import Scenario
+from eidrive_scenario.openscenario.model import ParameterType
 from eidrive_scenario.openscenario.variation import drawn_parameters
 from eidrive_scenario.roads.reading.document import read_road_text
 from eidrive_scenario.run_options import NO_COOPERATION, OPTIONS, RunSettings
@@ -47,6 +48,7 @@ class ResolvedSettings(RunSettings):
     weather          name of the preset that overrides the scenario; None if the scenario applies
     weather_profile  its content
     parameters       parameters of the scenario, with their final values
+    strings          names of the parameters of type string, whose values are no numbers
     drawn            names of the parameters whose values this seed has drawn
     varied           names of the parameters that a parameter value distribution assigns
     controllers      controller models, by name of the controller
@@ -72,6 +74,7 @@ class ResolvedSettings(RunSettings):
     stations: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     traffic_stations: tuple[Mapping[str, Any], ...] = ()
     weather_profile: Mapping[str, Any] | None = None
+    strings: tuple[str, ...] = ()
     drawn: tuple[str, ...] = ()
     varied: tuple[str, ...] = ()
     files: tuple[tuple[str, str, str], ...] = ()
@@ -140,6 +143,7 @@ def resolve_settings(setup: RunSetup, seed: int, settings: RunSettings) -> Resol
         stations=_without_folders(stations),
         traffic_stations=tuple(map(_without_folders, traffic)),
         weather_profile=_without_folders(_dump(weather)),
+        strings=tuple(sorted(name for name, kind in scenario.parameter_types.items() if kind is ParameterType.STRING)),
         drawn=_drawn(scenario, seed, settings),
         files=tuple(dict.fromkeys(files)),
         versions={**package_versions(), **resolved.versions},

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
@@ -98,9 +98,9 @@ class RunResult:
     def to_dict(self) -> dict[str, Any]:
         """Return the result as one flat row: every value is a number, a text, a truth value or None.
 
-        Columns: the outcome; `parameter.NAME`, as a number if the value is one; `channel.KEY`, the content of the
-        channel at the start; `NAME.passed`, `.value`, `.limit` of each criterion; the metrics by their names, without
-        those that have the name of another column; `warnings`, the number of them.
+        Columns: the outcome; `parameter.NAME`, as a number if the value is one and its type is not string;
+        `channel.KEY`, the content of the channel at the start; `NAME.passed`, `.value`, `.limit` of each criterion; the
+        metrics by their names, without those that have the name of another column; `warnings`, the number of them.
         `pandas.DataFrame([result.to_dict() for result in results])` is a table of runs.
         """
         row: dict[str, Scalar] = {
@@ -116,7 +116,8 @@ class RunResult:
             "warnings": len(self.warnings),
             **{option.name: getattr(self.settings, option.name) for option in OPTIONS if option.in_row},
         }
-        row.update((f"parameter.{name}", typed(text)) for name, text in self.parameters.items())
+        values = typed_parameters(self.parameters, self.settings.strings)
+        row.update((f"parameter.{name}", value) for name, value in values.items())
         row.update(_flat("channel", self.settings.channel_profile or {}))
         for verdict in self.criteria:
             row[f"{verdict.name}.passed"] = bool(verdict.passed)
@@ -167,6 +168,11 @@ def typed(text: str) -> str | int | float:
         return int(text) if len(digits) <= _MOST_DIGITS else text
     value = float(text)
     return value if math.isfinite(value) else text
+
+
+def typed_parameters(parameters: Mapping[str, str], strings: Collection[str]) -> dict[str, str | int | float]:
+    """Return parameters with numbers as such, except for `strings`, whose `1.10` differs from `1.1`."""
+    return {name: text if name in strings else typed(text) for name, text in parameters.items()}
 
 
 def _flat(name: str, value: Any) -> Iterator[tuple[str, Scalar]]:

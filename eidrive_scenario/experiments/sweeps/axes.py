@@ -258,9 +258,7 @@ def with_types(axes: Sequence[Axis], scenario: Path, *, is_distribution: bool = 
     if not all(is_setting(axis.name) for axis in axes):
         with suppress(InputError):
             source = load_distribution(scenario).scenario if is_distribution else scenario
-            declared = load_scenario(source).document.parameter_declarations
-            if declared is not None:
-                types = {parameter.name: parameter.parameter_type for parameter in declared.parameter_declaration}
+            types = load_scenario(source).parameter_types
     return tuple(
         _with_type(axis, None if is_setting(axis.name) else types.get(axis.name.removeprefix(PARAMETER)))
         for axis in axes

@@ -21,13 +21,14 @@ from eidrive_scenario.experiments.sweeps.axes import (
     Scalar,
     axis_identity,
     is_setting,
+    text_of_value,
 )
 from eidrive_scenario.experiments.sweeps.store import ABORTED, FAILED, NOT_JUDGED, PASSED, StoredRun
 from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.recording.recording import open_recording
 from eidrive_scenario.recording.run_files import MAX_DEPTH, RESULT, read_result, result_paths, unfinished_runs
 from eidrive_scenario.run_options import NO_COOPERATION, OPTIONS
-from eidrive_scenario.simulation.result import typed
+from eidrive_scenario.simulation.result import typed_parameters
 
 SCENARIO = "scenario"
 """Name of the axis over the scenarios of a folder."""
@@ -40,8 +41,17 @@ class _Settings(msgspec.Struct):
     seed: int
     run: int | None = None
     parameters: dict[str, str] = {}
+    strings: tuple[str, ...] = ()
     drawn: tuple[str, ...] = ()
     varied: tuple[str, ...] = ()
+
+    @property
+    def typed_parameters(self) -> dict[str, str | int | float]:
+        return typed_parameters(self.parameters, self.strings)
+
+
+class _Strings(msgspec.Struct):
+    strings: tuple[str, ...] = ()
 
 
 def folder_runs(locations: Sequence[Path], warn: Callable[[str], None]) -> list[StoredRun]:
@@ -90,21 +100,36 @@ def varying(runs: Iterable[StoredRun]) -> list[str]:
 def with_axes(runs: Iterable[StoredRun], axes: Mapping[str, str]) -> Iterator[StoredRun]:
     """Yield runs with these axes only. The settings of a run have the values of axes that its sweep lacks.
 
+    Values of string parameters are texts, also of runs that did not start.
+
     axes  names of the axes by `axis_identity`
     """
+    runs = list(runs)
+    strings = {(run.scenario, name) for run in runs for name in _strings_of(run)}
     for run in runs:
         values = {axis_identity(name): value for name, value in run.point.items()}
         if run.settings and not axes.keys() <= values.keys():
             with suppress(ValueError, RecursionError):  # settings of another form
                 values = {**_point(json.loads(run.settings)), **values}
         point = {name: values[key] for key, name in axes.items() if key in values}
+        for name, value in point.items():
+            if not is_setting(name) and (run.scenario, name.removeprefix(PARAMETER)) in strings:
+                point[name] = text_of_value(value)
         yield msgspec.structs.replace(run, point=point)
+
+
+def _strings_of(run: StoredRun) -> tuple[str, ...]:
+    """Return the names of the string parameters of a run; () if it did not start, or has settings of another form."""
+    try:
+        return msgspec.json.decode(run.settings, type=_Strings).strings
+    except (ValueError, RecursionError):
+        return ()
 
 
 def _finished(path: Path, number: int) -> StoredRun:
     result = parse_run(read_result(path), path)
     try:
-        point = _point(result.settings)
+        settings, point = msgspec.convert(result.settings, _Settings), _point(result.settings)
     except msgspec.ValidationError as error:
         raise InputError(
             Diagnostic(f"not the result of a run: {error}", f"give another {RESULT}", str(path))
@@ -118,7 +143,7 @@ def _finished(path: Path, number: int) -> StoredRun:
         **{name: getattr(result, name) for name in ("channel", "passed", "end_reason", "simulated_s", "wall_s")},
         "warnings": len(result.warnings),
         **{option.name: result.settings.get(option.name) for option in OPTIONS if option.in_row},
-        **{f"parameter.{name}": typed(text) for name, text in result.settings.get("parameters", {}).items()},
+        **{f"parameter.{name}": value for name, value in settings.typed_parameters.items()},
         **verdicts,
         "settings_sha256": result.settings_sha256,
         "trace_hash": result.trace_hash,
@@ -177,9 +202,9 @@ def _point(settings: Mapping[str, Any]) -> dict[str, Scalar]:
         if isinstance(value, str | int | float):
             point[name] = value
     point.update(_channel_settings(settings.get("channel_profile"), CHANNEL))
-    for name, text in resolved.parameters.items():
+    for name, value in resolved.typed_parameters.items():
         if name not in (*resolved.drawn, *resolved.varied):
-            point[f"{PARAMETER}{name}" if is_setting(name) or name == SCENARIO else name] = typed(text)
+            point[f"{PARAMETER}{name}" if is_setting(name) or name == SCENARIO else name] = value
     return point
 
 

@@ -38,10 +38,11 @@ from eidrive_scenario.experiments.sweeps.store import (
     StoredRun,
 )
 from eidrive_scenario.extensions.library import name_of
-from eidrive_scenario.openscenario import ConcreteRun
+from eidrive_scenario.openscenario import ConcreteRun, load_scenario
+from eidrive_scenario.openscenario.model import ParameterType
 from eidrive_scenario.perception.learned import image_memory
 from eidrive_scenario.run_options import with_option_names
-from eidrive_scenario.simulation.result import typed
+from eidrive_scenario.simulation.result import typed_parameters
 
 _is_worker = False
 """Whether this process only executes runs, so that no user interrupts it."""
@@ -116,7 +117,7 @@ def without_result(job: SweepJob, status: str, message: str, wall_s: float) -> S
     with suppress(InputError):  # of a distribution that has changed since the plan
         source = source_of(job)
     is_known = job.run is None or isinstance(source, ConcreteRun)
-    varied = source.parameters if isinstance(source, ConcreteRun) else {}
+    values = _values_of(source) if isinstance(source, ConcreteRun) else {}
     return StoredRun(
         key=job.key,
         number=job.number,
@@ -125,11 +126,20 @@ def without_result(job: SweepJob, status: str, message: str, wall_s: float) -> S
         seed=job.seed,
         status=status,
         point=dict(job.point),
-        result={f"parameter.{name}": typed(text) for name, text in varied.items()},
+        result={f"parameter.{name}": value for name, value in values.items()},
         error=with_option_names(message),
         command=command_of_source(source, job.seed, job.settings) if is_known else "",
         wall_s=round(wall_s, 4),
     )
+
+
+def _values_of(run: ConcreteRun) -> dict[str, str | int | float]:
+    """Return the values of the parameters that a distribution varies; all of an invalid scenario may be numbers."""
+    types: dict[str, ParameterType] = {}
+    with suppress(InputError):
+        types = load_scenario(run.scenario).parameter_types
+    strings = [name for name, kind in types.items() if kind is ParameterType.STRING]
+    return typed_parameters(run.parameters, strings)
 
 
 def _message(error: BaseException) -> str:

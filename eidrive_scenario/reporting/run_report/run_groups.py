@@ -11,7 +11,7 @@ from eidrive_scenario.experiments.sweeps.axes import PARAMETER, is_setting
 from eidrive_scenario.reporting.run_report.settings_text import channel_text, flatten, flow_text, shorten
 from eidrive_scenario.run_options import OPTIONS
 
-_LEFT_OUT = {"seed", "run", "drawn", "varied", "scenario"} | {
+_LEFT_OUT = {"seed", "run", "strings", "drawn", "varied", "scenario"} | {
     option.name for option in OPTIONS if option.detail in ("channel_profile", "stations")
 }
 """Settings that differ within a group, and options that the settings of channel and stations contain."""

@@ -96,8 +96,9 @@ def run_facts(settings: Mapping[str, Any]) -> dict[str, str]:
     for option in OPTIONS:
         if option.in_result and option.name not in _SHOWN_APART and option.name in settings:
             facts |= _option_facts(option, settings[option.name])
+    strings = given if isinstance(given := settings.get("strings"), list) else ()
     for name, value in _entries(settings.get("parameters")):
-        facts[f"${name}"] = shorten(short_number(str(value)))
+        facts[f"${name}"] = shorten(str(value) if name in strings else short_number(str(value)))
     for key in ("versions", "extensions"):
         for name, value in _entries(settings.get(key)):
             facts[str(name)] = shorten(flow_text(value))

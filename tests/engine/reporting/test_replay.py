@@ -21,7 +21,7 @@ from eidrive_scenario.recording.recording import Recording, read_recording
 from eidrive_scenario.reporting.notebook import write_replay
 from eidrive_scenario.reporting.replay.frame_data import replay_data
 from eidrive_scenario.reporting.replay.page import make_replay
-from eidrive_scenario.reporting.run_report.settings_text import short_number
+from eidrive_scenario.reporting.run_report.settings_text import run_facts, short_number
 from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition, StateChange
 
 Play = Callable[..., list[Frame]]
@@ -125,6 +125,11 @@ def test_replay_of_empty_recording_raises_input_error(tmp_path: Path) -> None:
 )
 def test_short_number_rounds_decimal_fractions_only(text: str, shown: str) -> None:
     assert short_number(text) == shown
+
+
+def test_run_facts_have_strings_as_written() -> None:
+    settings = {"parameters": {"Model": "1.10", "Speed": "1.10"}, "strings": ["Model"]}
+    assert run_facts(settings) == {"$Model": "1.10", "$Speed": "1.1"}
 
 
 def test_replay_page_without_stations_hides_station_panels(street: Play, tmp_path: Path) -> None:

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from pathlib import Path
 
 import pytest
+from command_fixtures import Eidrive, eidrive
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.experiments.sweeps.axes import Axis, parse_axis, points_of, settings_at, with_types
+from eidrive_scenario.experiments.sweeps.comparison import compare_values
+from eidrive_scenario.experiments.sweeps.results import stored_runs, values_of
+from eidrive_scenario.reporting.run_report.reported_runs import read_sweeps
+from eidrive_scenario.reporting.run_report.run_groups import group_runs
 from eidrive_scenario.simulation import RunSettings
+
+__all__ = ["eidrive"]
 
 COUNT = Axis("Count", low=0.5, high=4.5)
 
@@ -58,6 +66,50 @@ def test_other_numbers_remain_numbers(counted: Path, axis: str, values: tuple[ob
     (typed_axis,) = with_types([parse_axis(axis)], counted)
     assert typed_axis.values == values
     assert [type(value) for value in typed_axis.values] == [type(value) for value in values]
+
+
+@pytest.fixture
+def models(counted: Path) -> Path:
+    """Return a distribution over two texts of a string, and over a number in two forms."""
+    path = counted.with_name("models.xosc")
+    varied = "".join(
+        f'<DeterministicSingleParameterDistribution parameterName="{name}"><DistributionSet>{elements}'
+        "</DistributionSet></DeterministicSingleParameterDistribution>"
+        for name in ("Model", "Speed")
+        for elements in ["".join(f'<Element value="{text}"/>' for text in ("1.10", "1.1"))]
+    )
+    path.write_text(
+        '<?xml version="1.0"?><OpenSCENARIO>'
+        '<FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" author="test" description="models"/>'
+        f'<ParameterValueDistribution><ScenarioFile filepath="car.xosc"/><Deterministic>{varied}</Deterministic>'
+        "</ParameterValueDistribution></OpenSCENARIO>"
+    )
+    return path
+
+
+def test_texts_of_a_distribution_remain_apart_and_numbers_do_not(eidrive: Eidrive, models: Path) -> None:
+    store, runs = models.with_name("s.db"), models.with_name("runs")
+    eidrive("sweep", models, "--store", store, "--workers", "1")
+    eidrive("run", models, "--seed", "2", "--no-record", "--out", runs)
+    for stores in ([store], [runs], [store, runs]):
+        values = values_of(stored_runs(stores))
+        assert (values["Model"], values["Speed"]) == (["1.10", "1.1"], [1.1])
+    groups = [
+        json.loads(line)["point"] for line in eidrive("results", store, "--by", "Model", "--json").stdout.splitlines()
+    ]
+    assert groups == [{"Model": "1.10"}, {"Model": "1.1"}]
+    (compared,) = compare_values([store, runs], "Model", ["1.10", "1.1"])
+    assert (compared.first, compared.second) == ("1.10", "1.1")
+    (group,) = group_runs(read_sweeps([store])[0])
+    assert {run.value_of("Model") for run in group.runs} == {"1.10", "1.1"}
+
+
+def test_numbers_of_a_string_are_texts_in_results(eidrive: Eidrive, counted: Path) -> None:
+    store, runs = counted.with_name("s.db"), counted.with_name("runs")
+    eidrive("sweep", counted, "--vary", "Model=1,2.5", "--store", store, "--workers", "1")
+    eidrive("run", counted, "--param", "Model=1", "--seed", "2", "--no-record", "--out", runs)
+    assert values_of(stored_runs([store, runs]))["Model"] == ["1", "2.5"]
+    assert all(run.result["parameter.Model"] == run.point["Model"] for run in stored_runs([store, runs]))
 
 
 def test_one_number_in_two_forms_is_given_twice(counted: Path) -> None:
