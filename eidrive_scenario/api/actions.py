@@ -37,6 +37,7 @@ from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.route import build_route as build_route
 from eidrive_scenario.storyboard.kinematics.route import faces_traffic as faces_traffic
 from eidrive_scenario.storyboard.kinematics.route import random_route as random_route
+from eidrive_scenario.storyboard.kinematics.route import rejoin_route as rejoin_route
 from eidrive_scenario.storyboard.kinematics.route import target_lane as target_lane
 from eidrive_scenario.storyboard.kinematics.route import uniform_branch_selector as uniform_branch_selector
 from eidrive_scenario.storyboard.kinematics.trailers import road_train as road_train

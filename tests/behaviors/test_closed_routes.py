@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from opendrive_xml import junction_xml, map_xml, predecessor_xml, successor_xml
-from storyboard_xml import private_xml
+from recorded_scene import RunScene
+from storyboard_xml import private_xml, teleport_xml
 from street_scene import NOTHING, THROUGH, after, lane_road
 from whole_run import RecordedRun, Run
 
@@ -77,6 +78,28 @@ def test_route_takes_another_branch_on_its_second_pass(run: Run, driven: bool) -
         assert position[0] > 100.0 + 20.0 * math.pi
         return
     assert position[:2] == pytest.approx((50.0 + 35.0 * 20.0 - LAP, -2.0), abs=0.1)
+
+
+@pytest.mark.element("TeleportAction")
+@pytest.mark.parametrize(
+    ("passed", "laps"), [(None, 1), (20.0, 1), (50.0, 0)], ids=["on road 1", "before the waypoint", "after it"]
+)
+def test_teleported_vehicle_keeps_waypoints_ahead(scene: RunScene, passed: float | None, laps: int) -> None:
+    """From a branch into road 1: by the waypoint on road 2, at x = 70 m, a lap before the exit, or straight to it."""
+    branch = lane_road(5, -100.0, 0.0, 0.0, 100.0, successor_xml("1"), THROUGH)
+    street = ring().replace("<junction", f"{branch}<junction", 1)
+    position = '<LanePosition roadId="{}" laneId="-1" s="{}"/>'
+    there = () if passed is None else (("Ego", teleport_xml(position.format(2, passed)), after(0.25)),)
+    away = ("Ego", teleport_xml(position.format(5, 50.0)), after(0.45))
+    actions = (("Ego", assign("false", (1, 60.0), (2, 30.0), (3, 800.0))), *there, away)
+    played = scene(0.6, *actions, street=street, ego=(-1, 50.0, 20.0), other=(-1, 90.0, 0.0), driven=True)
+    path = played.commands[-1].goals["Ego"].path
+    assert path is not None
+    assert path[0, :2] == pytest.approx((-50.0, -2.0))
+    assert path[-1, :2] == pytest.approx((100.0 + 20.0 * math.pi + 800.0, -2.0))
+    assert (np.hypot(*(path[:, :2] - (70.0, 42.0)).T).min() < 2.0) == bool(laps)
+    length = np.hypot(*np.diff(path[:, :2], axis=0).T).sum()
+    assert length == pytest.approx(950.0 + 20.0 * math.pi + laps * LAP, abs=0.1)
 
 
 def test_open_route_ends_at_its_last_waypoint(run: Run) -> None:

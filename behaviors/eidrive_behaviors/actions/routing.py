@@ -21,11 +21,20 @@ from eidrive_scenario.api.actions import (
     facing,
     model,
     random_route,
+    rejoin_route,
     resolve_position,
     target_lane,
     uniform_branch_selector,
 )
-from eidrive_scenario.api.common import EidriveError, LaneLocation, RoadNetwork, Route, RouteError, generator
+from eidrive_scenario.api.common import (
+    EidriveError,
+    LaneLocation,
+    Pose,
+    RoadNetwork,
+    Route,
+    RouteError,
+    generator,
+)
 
 POINTS_APART = 2.0
 """Maximum spacing of the points of a path that is handed to a controller [m]."""
@@ -217,10 +226,11 @@ def check_way(behaviour: ActionBehaviour, length: float) -> None:
         raise behaviour.error(message, hint)
 
 
-def resume_route(behaviour: ActionBehaviour, place: ResolvedPosition) -> None:
-    """Plan a new way to the destination of the route of a driven actor if the route does not lead along a position.
+def resume_route(behaviour: ActionBehaviour, place: ResolvedPosition, before: Pose | None) -> None:
+    """Plan a new way to the next waypoint of the route of a driven actor if the route does not lead along a position.
 
-    Without a way the actor follows its lane, with a warning.
+    The waypoints between the previous pose and the destination remain, all of them if the actor was absent. Without a
+    way the actor follows its lane, with a warning.
     """
     actor, roads = behaviour.actor, behaviour.context.roads
     goal, route = actor.goal, actor.motion.route
@@ -230,7 +240,7 @@ def resume_route(behaviour: ActionBehaviour, place: ResolvedPosition) -> None:
     if route is None or goal.leads_along(x, y, heading):
         return
     try:
-        way = roads.route(place.location, route.end)
+        way = rejoin_route(roads, place.location, route, before)
     except RouteError:
         message = f"no way leads to the destination of the route of {actor.name!r}: it follows its lane"
         behaviour.warn(message, "teleport it to a lane from which its destination can be reached")

@@ -11,7 +11,7 @@ from eidrive_scenario.api.actions import ActionBehaviour, model, resolve_positio
 class TeleportAction(ActionBehaviour):
     """Teleport of the actor to a position. An absent actor is added to the world; its speed is kept.
 
-    An active controller continues the route there, or on a new way to its destination if it does not lead along there.
+    An active controller continues the route there, or on a new way to the next waypoint if it does not lead along.
     """
 
     action: model.TeleportAction
@@ -19,8 +19,9 @@ class TeleportAction(ActionBehaviour):
     def update(self) -> Status:
         """Teleport the actor."""
         target = resolve_position(self.action.position, self.context, self.actor.name)
+        before = self.actor.motion.pose if self.actor.present else None
         self.context.add_actor(self.actor.name, target)
-        resume_route(self, target)
+        resume_route(self, target, before)
         return Status.SUCCESS
 
     def describe(self) -> str:

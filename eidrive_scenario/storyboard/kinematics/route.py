@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import accumulate
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from eidrive_scenario.roads import (
     Cost,
     LaneKey,
     LaneLocation,
+    Pose,
     RoadNetwork,
     Route,
     RouteError,
@@ -27,6 +29,7 @@ from eidrive_scenario.roads import (
     random_costs,
     select_lanes,
 )
+from eidrive_scenario.roads.routing.route import concatenate_routes
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 
 _OF_NO_LANE = (
@@ -125,6 +128,24 @@ def _connect_waypoints(
     if passed:
         return replace(connect(start, waypoints[0], waypoints[1:], [*costs[1:], costs[0]]), lap=lap)
     return replace(connect(start, waypoints[0], costs=costs[:1]), lap=lap)
+
+
+def rejoin_route(roads: RoadNetwork, here: LaneLocation, route: Route, before: Pose | None) -> Route:
+    """Return a route to the next waypoint of a route and along the rest of it. Raise RouteError if there is none.
+
+    before  last pose of the actor on the route; None for an actor that was absent, which has all waypoints ahead
+    """
+    parts = route.parts or (route,)
+    if before is None:
+        waypoint, ahead = route.start, parts
+    else:
+        along, _ = route.project(before.x, before.y)
+        reached = sum(end <= along for end in accumulate(part.length for part in parts[:-1]))
+        waypoint, ahead = parts[reached].end, parts[reached + 1 :]
+    if route.against_traffic:  # The way to the waypoint may lead with the traffic
+        *via, end = waypoint, *(part.end for part in ahead)
+        return roads.route(here, end, via)
+    return concatenate_routes([roads.route(here, waypoint), *ahead])
 
 
 def _cost(route: model.Route, number: int, roads: RoadNetwork, seed: int) -> Cost | None:
