@@ -130,10 +130,15 @@ def build_result(
 
 
 def criteria_metrics(criteria: Sequence[Criterion]) -> dict[str, float]:
-    """Return the metrics of all criteria, by name."""
+    """Return the metrics of all criteria, by name.
+
+    A metric with the name but not the value of an earlier one begins with the name of its criterion.
+    """
     metrics: dict[str, float] = {}
     for criterion in criteria:
-        metrics.update(checked_metrics(criterion))
+        for name, value in checked_metrics(criterion).items():
+            if metrics.setdefault(name, value) != value:
+                metrics[f"{criterion.name}.{name.partition('.')[2]}"] = value
     return metrics
 
 

@@ -7,6 +7,7 @@ import pytest
 from eidrive_criteria.min_distance import MinDistance, MinDistanceSettings
 
 from eidrive_scenario.api.criteria import Verdict, evaluate_criteria
+from eidrive_scenario.simulation.run_outcome import criteria_metrics
 
 
 def criterion(**settings: Any) -> MinDistance:
@@ -88,3 +89,17 @@ def test_min_distance_without_common_presence_fails(frame: Any, car: Any) -> Non
     assert not verdict.passed
     assert verdict.reason == "Ego and Incoming were never present at the same time"
     assert distance.metrics() == {}
+
+
+def test_two_measures_of_a_pair_have_a_time_each(frame: Any, car: Any) -> None:
+    """Beside Ego the centers are 3.9 m and the bodies 1.9 m apart, ahead of it 4.5 m and 0.5 m."""
+    places = enumerate([car(0.0, 3.9), car(4.5, 0.0)])
+    frames = [frame(float(second), {"Ego": car(0.0), "Incoming": place}) for second, place in places]
+    criteria = [criterion(measure="center"), criterion(measure="box", name="min_distance_2")]
+    evaluate_criteria(frames, criteria)
+    assert criteria_metrics(criteria) == {
+        "min_distance.Ego.Incoming.center": pytest.approx(3.9),
+        "min_distance.Ego.Incoming.box": pytest.approx(0.5),
+        "min_distance.Ego.Incoming.time": 0.0,
+        "min_distance_2.Ego.Incoming.time": 1.0,
+    }

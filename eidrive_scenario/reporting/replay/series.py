@@ -147,12 +147,13 @@ def closest_approach(
         if name.startswith("min_distance.") and name.endswith(".time") and time is not None and math.isfinite(time):
             pair = name.removeprefix("min_distance.").removesuffix(".time")
             center, box = (metrics.get(f"min_distance.{pair}.{measure}") for measure in ("center", "box"))
-            # Of two criteria for one pair, the metrics contain the time of the last one
+            # Of two criteria for one pair, the last one counts, whose time may begin with its own name
             both = [value for value in values if value is not None and value in (center, box)]
             measured = both[-1] if both else center
+            times = [value for other, value in metrics.items() if other.endswith(f".{pair}.time") and value is not None]
             if measured is not None and math.isfinite(measured):
                 ends = "centers" if measured == center else "bodies"
-                approaches.append((measured, time, _pair_text(pair, names), ends))
+                approaches.append((measured, times[-1], _pair_text(pair, names), ends))
     if not approaches:
         return None
     distance, time, pair, ends = min(approaches)

@@ -211,6 +211,8 @@ def test_closest_approach_is_the_distance_that_a_criterion_measured() -> None:
     assert closest_approach(metrics, [4.5, 2.5]) == closest_approach(metrics, []) == bus
     car = {"time": 3.0, "text": "closest approach of Ego and Car: 0.40 m between bodies"}
     assert closest_approach(metrics, [None, 0.4, 1.0]) == closest_approach(metrics, [4.5, 0.4]) == car
+    second = closest_approach({**metrics, "min_distance_2.Ego.Car.time": 5.0}, [4.5, 0.4])
+    assert second == {"time": 5.0, "text": "closest approach of Ego and Car: 0.40 m between bodies"}
     assert closest_approach({"collision.count": 1.0}, []) is None
 
 
