@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -233,7 +234,7 @@ class World:
         touches = self._physics.tick(bodies, self._driven, controls, self._friction)
         self.tick += 1
         self._view = None
-        self._contacts.step(bodies, touches)
+        self._contacts.step(bodies, touches, partial(self._physics.is_near_object, bodies))
 
     def view(self) -> WorldView:
         """Return the current view, the same object until a change."""

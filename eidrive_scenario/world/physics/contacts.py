@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -122,10 +122,14 @@ class ContactTracker:
         self._touching = {pair: None for pair in self._touching if name not in pair}
         self._late = tuple(contact for contact in self._late if name not in (contact.first, contact.second))
 
-    def step(self, bodies: BodyGroup, touches: Touches) -> None:
-        """Find the contacts that started in a step; `touches` are those of pybullet."""
+    def step(self, bodies: BodyGroup, touches: Touches, is_near_object: Callable[[Body, str, float], bool]) -> None:
+        """Find the contacts that started in a step.
+
+        touches         contacts of pybullet
+        is_near_object  whether a static object of a name is within a margin of a body [m]
+        """
         near = _near_pairs(bodies)
-        self._end_parted(near, bodies, touches)
+        self._end_parted(near, bodies, touches, is_near_object)
         self._started = self._late + self._start(near, touches)
         self._late, self._is_viewed = (), False
 
@@ -134,17 +138,24 @@ class ContactTracker:
         self._is_viewed = True
         return self._started
 
-    def _end_parted(self, near: _NearPairs, bodies: BodyGroup, touches: Touches) -> None:
+    def _end_parted(
+        self,
+        near: _NearPairs,
+        bodies: BodyGroup,
+        touches: Touches,
+        is_near_object: Callable[[Body, str, float], bool],
+    ) -> None:
         """Forget the contacts of pairs that have parted in a step."""
         if not self._touching:
             return
         moved = bodies.moved_names()
+        named = {body.name: body for body in bodies.members}
         for pair in [pair for pair in self._touching if pair not in touches]:
             if pair in near:
                 first, second = near[pair]
                 if frozenset(pair) in self._couplings.pairs or box_distance(first.box, second.box) <= PARTED:
                     continue
-            elif moved.isdisjoint(pair):
+            elif moved.isdisjoint(pair) or (pair[1] not in named and is_near_object(named[pair[0]], pair[1], PARTED)):
                 continue
             del self._touching[pair]
 

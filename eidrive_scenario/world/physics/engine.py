@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain, repeat
 
+import numpy as np
+
 from eidrive_scenario.base.geometry import box_distance
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.world.actor import Control, Vector3
@@ -109,6 +111,18 @@ class Physics:
         if watched:
             self.refresh(bodies)
         return touches
+
+    def is_near_object(self, bodies: BodyGroup, body: Body, name: str, margin: float) -> bool:
+        """Return whether a static object of this name is within a margin of a body [m]."""
+        self.refresh(bodies)
+        low, high = np.array(bullet.getAABB(body.handle, physicsClientId=self._client))
+        around = (low - margin).tolist(), (high + margin).tolist()
+        handles = {handle for handle, _ in bullet.getOverlappingObjects(*around, physicsClientId=self._client) or ()}
+        return any(
+            self._scenery.name_of(handle, point[5]) == name
+            for handle in handles & self._scenery.handles
+            for point in bullet.getClosestPoints(body.handle, handle, margin, physicsClientId=self._client)
+        )
 
     def _step_through(
         self,

@@ -386,9 +386,14 @@ class Scenery:
         return min(self._built[handle], key=lambda building: footprint_distance(building.box, point)).name
 
     @property
+    def handles(self) -> set[int]:
+        """Handles of these bodies in pybullet."""
+        return {*self._ground, *self._built, *self._obstacle_handles}
+
+    @property
     def highest_handle(self) -> int:
         """Maximum handle of these bodies in pybullet; -1 without any."""
-        return max([*self._ground, *self._built, *self._obstacle_handles], default=-1)
+        return max(self.handles, default=-1)
 
     def clearance(self, x: float, y: float, most: float) -> float:
         """Return the distance of a point from the nearest static object, at most `most` [m]."""

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from sample_car import CarFactory
 
+from eidrive_scenario.base.geometry import footprint_distance
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Control, Placement
 from eidrive_scenario.world.view import Contact
@@ -180,6 +182,24 @@ def test_actors_that_enter_do_not_restart_a_contact_with_a_wall(
         ticks += [tick for _ in world.view().contacts]
     assert ticks
     assert max(ticks) < 20
+
+
+def test_scrape_along_a_wall_is_one_contact_until_a_gap(world: World, car: CarFactory) -> None:
+    """A car that steers to the wall and off it is at most 2 cm from it; then it leaves and returns."""
+    wall = (200.0, 2.5, 0.0, 400.0, 1.0, 3.0, 0.0)
+    world.add_building("Wall", (200.0, 2.5, 1.5), (400.0, 1.0, 3.0))
+    world.add(car("Ego"), Placement(0.0, 0.0, yaw=0.1, speed=12.0), driven=True)
+    contacts, gaps = [], []
+    for tick in range(300):
+        steering = (-0.2 if tick < 175 else 0.2) if 160 <= tick < 200 else (0.05, -0.02)[tick // 4 % 2]
+        world.step({}, {"Ego": Control(throttle=0.3, steering=steering)})
+        contacts += [(tick, contact.second) for contact in world.view().contacts]
+        gaps.append(footprint_distance(world.view().plain_boxes[0], wall))
+    assert max(gaps[40:160]) < 0.02
+    assert [tick < 160 for tick, _ in contacts] == [True] + [False] * (len(contacts) - 1)
+    assert len(contacts) > 1
+    assert {name for _, name in contacts} == {"Wall"}
+    assert all(max(gaps[former:later]) > 0.05 for (former, _), (later, _) in pairwise(contacts))
 
 
 @pytest.mark.parametrize("driven", [False, True], ids=["scripted", "driven"])
