@@ -113,6 +113,17 @@ def test_start_with_parent_is_observed_as_edge_in_any_order(
     ]
 
 
+@pytest.mark.parametrize(("order", "x"), [(list, 40.0), (reversed, 20.0)], ids=["20 m, 40 m", "40 m, 20 m"])
+def test_last_act_in_the_file_decides_in_one_step(build: Any, order: Any, x: float) -> None:
+    acts = [
+        act_xml(group_xml(maneuver_xml(event("move", "", teleport_xml(world_position_xml(to)))), "A"), name=f"to {to}")
+        for to in (20, 40)
+    ]
+    storyboard = build(PLACE, story=acts_xml(*order(acts)))
+    storyboard.initial()
+    assert storyboard.tick(storyboard.context.view).placements["A"].x == x
+
+
 @pytest.mark.element("StoryboardElementStateCondition", "edge falling")
 def test_transition_before_the_first_evaluation_is_over_in_the_next_step(build: Any) -> None:
     """The start of the act is observed in its step, so that it becomes false in the next one."""
