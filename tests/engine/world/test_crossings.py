@@ -25,9 +25,10 @@ def random_lines(rng: np.random.Generator, count: int, height: tuple[float, floa
 def inside(world: World, begin: Array, end: Array, row: int, shrunk: float) -> bool:
     """Return whether one of many points of a line is inside a box that is smaller on all sides."""
     view = world.view()
-    points = begin + np.linspace(0.0, 1.0, STEPS)[:, None] * (end - begin) - view.position[row]
-    local = points @ rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row]) - view.offset[row]
-    return bool((np.abs(local) < view.size[row] / 2.0 - shrunk).all(axis=1).any())
+    rotation = rotation_matrix(view.yaw[row], view.pitch[row], view.roll[row])
+    first, last = ((point - view.position[row]) @ rotation - view.offset[row] for point in (begin, end))
+    points = first[:, None] + np.linspace(0.0, 1.0, STEPS) * (last - first)[:, None]
+    return bool((np.abs(points) < (view.size[row] / 2.0 - shrunk)[:, None]).all(axis=0).any())
 
 
 @pytest.mark.exhaustive
