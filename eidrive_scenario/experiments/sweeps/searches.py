@@ -94,7 +94,7 @@ class BoundarySearch:
         self._rates = np.stack([self._rate(x) for x in self._tried])
         self._log = np.zeros(boundary.shape)
         for x, success in self._outcomes:
-            self._log += self._log_likelihood(x, success)
+            self._log += _log_likelihood(self._rate(x), success)
 
     def _rate(self, x: float) -> Array:
         from scipy.special import expit
@@ -105,20 +105,16 @@ class BoundarySearch:
     def add(self, x: float, success: bool) -> None:
         """Add the outcome of a run at a value."""
         self._outcomes.append((x, success))
-        self._log += self._log_likelihood(x, success)
+        self._log += _log_likelihood(self._rate(x), success)
         self._shrink()
-
-    def _log_likelihood(self, x: float, success: bool) -> Array:
-        rate = self._rate(x)
-        return np.log(np.maximum(rate if success else 1.0 - rate, 1e-12))
 
     def proposals(self, count: int) -> list[float]:
         """Return the values of the next runs. Their outcomes are assumed to be the likelier ones for each other."""
         held, proposals = self._log.copy(), []
         for _ in range(count):
-            x, likelier = self._next_value(held)
-            proposals.append(x)
-            held = held + self._log_likelihood(x, likelier)
+            best, likelier = self._next_value(held)
+            proposals.append(float(self._tried[best]))
+            held += _log_likelihood(self._rates[best], likelier)
         return proposals
 
     def _shrink(self) -> None:
@@ -137,16 +133,15 @@ class BoundarySearch:
         low, middle, high = np.interp(shares, np.cumsum(marginal), ends).tolist()
         return low, middle, high
 
-    def _next_value(self, log: Array) -> tuple[float, bool]:
-        """Return the value with the minimum expected entropy of the boundary, and its likelier outcome."""
+    def _next_value(self, log: Array) -> tuple[int, bool]:
+        """Return the index of the value with the minimum expected entropy of the boundary, and its likelier outcome."""
         posterior = _normalized(log)
-        weighted = self._rates * posterior
-        success = weighted.reshape(TRIED, BOUNDARIES, -1).sum(axis=2)
+        success = np.einsum("vbwsl,bwsl->vb", self._rates, posterior)
         total = posterior.reshape(BOUNDARIES, -1).sum(axis=1)
         rate = success.sum(axis=1)
         entropy = _entropy(success) + _entropy(total[None] - success)
         best = int(np.argmin(entropy))
-        return float(self._tried[best]), bool(rate[best] >= 0.5)
+        return best, bool(rate[best] >= 0.5)
 
     def estimate(self) -> Boundary:
         """Return the estimate with its central credible interval."""
@@ -158,6 +153,10 @@ class BoundarySearch:
         rising = float(posterior[:, :, 1].sum())
         value = middle if self.low <= middle <= self.high else math.nan
         return Boundary(value, max(low, self.low), min(high, self.high), inside, rising, self.runs)
+
+
+def _log_likelihood(rate: Array, success: bool) -> Array:
+    return np.log(np.maximum(rate if success else 1.0 - rate, 1e-12))
 
 
 def _normalized(log: Array) -> Array:
