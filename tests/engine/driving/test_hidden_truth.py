@@ -6,6 +6,7 @@ Each hidden actor of each library scenario is moved; the plans are the same up t
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -154,5 +155,5 @@ def check_hidden_actors(name: str, channel: str, tmp_path: Path, **parameters: s
 )
 def test_library_has_hidden_actors(name: str, actor: str) -> None:
     """The comparison is not empty: these actors are unknown for more than a second."""
-    steps = list(decisions(library_path() / f"{name}.xosc", "none"))
-    assert actor not in steps[20].known
+    steps = decisions(library_path() / f"{name}.xosc", "none")
+    assert actor not in next(islice(steps, 20, None)).known
