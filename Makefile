@@ -3,6 +3,7 @@ PYTHON ?= python3.11
 VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
+EXTRAS ?= dev,learned,onnx,openvino
 
 .PHONY: help help-all install demo test test-all lint reproduce docs check-docs check-standards bench bench-compare bench-corpora bench-history eval closed-loop planners overtaking corner-cases driven-files long-drives heat-maps fusion-picture library-pictures weather-sheet pages clean
 
@@ -17,7 +18,7 @@ install: $(STAMP)  ## create .venv and install the project with its development 
 $(STAMP): pyproject.toml constraints.txt
 	@command -v $(PYTHON) >/dev/null || { echo "$(PYTHON) is not installed; name another with: make PYTHON=python3 …"; exit 2; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,learned,onnx,openvino]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[$(EXTRAS)]'
 	$(BIN)/python -m eidrive_scenario.cli.compile_kernels
 	@touch $@
 
