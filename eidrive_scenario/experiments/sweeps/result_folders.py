@@ -50,10 +50,6 @@ class _Settings(msgspec.Struct):
         return typed_parameters(self.parameters, self.strings)
 
 
-class _Strings(msgspec.Struct):
-    strings: tuple[str, ...] = ()
-
-
 def folder_runs(locations: Sequence[Path], warn: Callable[[str], None]) -> list[StoredRun]:
     """Return the runs whose results are in these files and folders, and the interrupted ones, which are aborted.
 
@@ -121,7 +117,7 @@ def with_axes(runs: Iterable[StoredRun], axes: Mapping[str, str]) -> Iterator[St
 def _strings_of(run: StoredRun) -> tuple[str, ...]:
     """Return the names of the string parameters of a run; () if it did not start, or has settings of another form."""
     try:
-        return msgspec.json.decode(run.settings, type=_Strings).strings
+        return msgspec.json.decode(run.settings, type=_Settings).strings
     except (ValueError, RecursionError):
         return ()
 

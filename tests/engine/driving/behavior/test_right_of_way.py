@@ -183,10 +183,11 @@ def test_vehicle_with_priority_stops_for_a_car_that_turns_before_it(speed: float
     begin = float(np.interp(-55.0, -turn[:, 0], along))
 
     def car(now: float) -> list[KnownBox]:
-        place = begin + speed * (now - (59.0 / 8.0 - 2.0))
-        x, y = (float(np.interp(place, along, values)) for values in turn.T)
-        ahead = [float(np.interp(place + 1.0, along, values)) for values in turn.T]
-        yaw = math.atan2(ahead[1] - y, ahead[0] - x)
+        distance = begin + speed * (now - (59.0 / 8.0 - 2.0))
+        (x, x_ahead), (y, y_ahead) = (
+            np.interp((distance, distance + 1.0), along, values).tolist() for values in turn.T
+        )
+        yaw = math.atan2(y_ahead - y, x_ahead - x)
         return [KnownBox(x, y, speed * math.cos(yaw), speed * math.sin(yaw), yaw=yaw)]
 
     run = PlannedDrive(behavior(roads, 8.0), roads, speed=8.0, start=-30.0, y=0.0)
