@@ -43,6 +43,8 @@ STOPPING = 2.0
 """Deceleration with which a vehicle is predicted to stop at a sign [m/s²]; one that needs COMFORTABLE for it passes."""
 AT_SIGN = 1.0
 """Distance of the front from a sign within which the vehicle has stopped there or passes it [m]."""
+SIMILAR_TURN = 0.6
+"""Maximum difference to its smallest turn of other turns that a vehicle which gives way is expected to take [rad]."""
 HARSH = math.sqrt(7.0 / FASTEST_TURN)
 """Ratio of the speeds in a curve at the limit of the tires (0.7 g) and at that of comfort. A vehicle that has been
 predicted to follow a lane may be that fast."""
@@ -168,8 +170,9 @@ class Predictor:
         leaving: list[Hypothesis] = []
         """Along lanes that the vehicle leaves, crosses or is beside of: only if it follows no lane."""
         followed: list[Course] = []
-        deviations: list[tuple[float, bool]] = []
-        """Lateral speeds from the lanes that it follows [m/s], and whether it would give way to the ego on them."""
+        deviations: list[tuple[float, float]] = []
+        """Lateral speeds from the lanes that it follows [m/s], and largest turns with which it gives way to the ego
+        [rad], -inf if it does not."""
         direction = math.atan2(known_object.vy, known_object.vx)
         noise = known_object.speed_error
         # A vehicle that accelerates does so until its driver reacts to a curve.
@@ -211,16 +214,18 @@ class Predictor:
             fitting.append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead, z))
             if fitting is following:
                 followed.append(course)
-                deviations.append((abs(aside), defers is not None and any(map(defers, ahead))))
+                turns = [abs(passage.turn) for passage in ahead if defers is not None and defers(passage)]
+                deviations.append((abs(aside), max(turns, default=-math.inf)))
             if len(following) == MOST_HYPOTHESES:
                 break
         known_object.followed = followed
         # It is expected to turn before the ego only if it leaves its lane, in the direction of the turn.
-        least = min((deviation for deviation, waits in deviations if not waits), default=math.inf)
+        usual = min((turn for _, turn in deviations), default=0.0) + SIMILAR_TURN
+        least = min((deviation for deviation, turn in deviations if turn <= usual), default=math.inf)
         following = [
             hypothesis
-            for hypothesis, (deviation, waits) in zip(following, deviations, strict=True)
-            if not waits or least > max(steady, deviation)
+            for hypothesis, (deviation, turn) in zip(following, deviations, strict=True)
+            if turn <= usual or least > max(steady, deviation)
         ]
         return following or too_fast or leaving[:MOST_HYPOTHESES] or [_straight_on(known_object, travelled, speed)]
 

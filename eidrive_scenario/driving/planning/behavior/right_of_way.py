@@ -194,8 +194,6 @@ SPACING = 2.0
 """Distance between the points of a course [m]."""
 LENGTH = 180.0
 """Minimum length of a course beyond its first lane, unless the lanes end [m]."""
-SIMILAR_TURN = 0.6
-"""Maximum difference of the turn of a branch to the smallest turn at which it is likely, too [rad]."""
 MOST = 4
 """Maximum number of courses from one lane."""
 
@@ -308,7 +306,7 @@ class LaneCourses:
         self._courses: dict[int, tuple[Course, ...]] = {}
 
     def ahead(self, lane: int) -> tuple[Course, ...]:
-        """Return the likely courses from the start of a lane (running number), in its driving direction."""
+        """Return the courses from the start of a lane (running number), in its driving direction."""
         courses = self._courses.get(lane)
         if courses is None:
             chains = self._chains([self._roads.tables.lane_keys[lane]], 0.0)[:MOST]
@@ -322,9 +320,8 @@ class LaneCourses:
             key = chain[-1]
             direction = self._roads.driving_direction(key.road, key.lane)
             branches = [branch for branch in self._roads.movement.branches(key, direction) if branch.lane not in chain]
-            # Those whose turn is about as small as the smallest are likely.
-            least = min((abs(branch.turn) for branch in branches), default=0.0)
-            branches = [branch for branch in branches if abs(branch.turn) <= least + SIMILAR_TURN]
+            # The straightest first, as not all alternatives of many are kept.
+            branches.sort(key=lambda branch: abs(branch.turn))
             if not branches:
                 break
             if len(branches) > 1:

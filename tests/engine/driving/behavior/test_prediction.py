@@ -243,6 +243,15 @@ def test_turn_that_gives_way_is_predicted_once_it_shows(turned: float, expected:
     assert (np.abs(prediction.y[:, -1] - 3.5) < 0.5).any()
 
 
+@pytest.mark.parametrize(("defers", "turns"), [(False, {-1, 0, 1}), (True, {0})])
+def test_only_vehicle_with_the_right_of_way_may_turn_before_a_junction(defers: bool, turns: set[int]) -> None:
+    """It comes from the south, 20 m before the junction; turns in units of 90 degrees."""
+    roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
+    box = KnownBox(43.8, -32.0, vy=6.0, yaw=math.pi / 2.0)
+    prediction = Predictor(roads, TIMES).predict(known(box), defers=lambda passage: defers)
+    assert set(np.round((prediction.yaw[:, -1] - math.pi / 2.0) / (math.pi / 2.0)).tolist()) == turns
+
+
 @pytest.mark.parametrize(("acceleration", "turns"), [(0.0, True), (1.0, False)])
 def test_vehicle_that_accelerates_beyond_the_speed_of_a_turn_does_not_turn(acceleration: float, turns: bool) -> None:
     """The left turn of a radius of 10 m, passed with 6.3 m/s (4 m/s²), is 8 m after the place of the oncoming car.

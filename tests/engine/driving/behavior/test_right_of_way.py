@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from opendrive_xml import road_xml
-from planned_drive import KnownBox, PlannedDrive, behavior
+from planned_drive import FRONT, KnownBox, PlannedDrive, behavior
 from signal_street import CAR
 
 from eidrive_scenario.base.arrays import Array
@@ -172,6 +172,24 @@ def test_vehicle_with_the_right_of_way_does_not_brake_for_oncoming_traffic(speed
     run.run(100.0 / speed, lambda now: [KnownBox(start - other_speed * now, 3.5, vx=-other_speed, yaw=math.pi)])
     run.world.close()
     assert min(run.speeds) > speed - 0.1
+
+
+@pytest.mark.parametrize("later", [-0.75, 0.0, 0.75])
+def test_vehicle_brakes_comfortably_for_traffic_from_the_right(later: float) -> None:
+    """A car with the right of way drives straight on; until it is in the junction it could also turn left, across a
+    nearer part of the way of the vehicle. Both would be in the middle of the junction at about the same time."""
+    roads = RoadNetwork.load(ROADS / "four_way_junction.xodr")
+    run = PlannedDrive(behavior(roads, 8.0), roads, speed=8.0, start=-30.0, y=0.0)
+    arrival = 72.0 / 8.0 + later
+    run.run(20.0, lambda now: [KnownBox(43.8, 8.0 * (now - arrival), vy=8.0, yaw=math.pi / 2.0)])
+    run.world.close()
+    speeds = np.array(run.speeds)
+    assert ((speeds[:-10] - speeds[10:]) / 0.5).max() < 3.05
+    # The car has left the lane before the vehicle reaches its side.
+    enters = next(0.05 * number for number, (x, _, _) in enumerate(run.path) if x + FRONT > 43.8 - 0.9)
+    assert 8.0 * (enters - arrival) - 2.25 > CAR.size[1] / 2.0
+    # After a standstill at the entry of the junction it would be there 4.5 s behind the car: 15 m with 1.5 m/s².
+    assert enters < arrival + 4.5
 
 
 @pytest.mark.parametrize("speed", [4.0, 6.0])
