@@ -70,12 +70,12 @@ def test_short_gap_is_refused_and_long_gap_accepted(tmp_path: Path, kind: str, g
 @pytest.mark.statistical
 @pytest.mark.parametrize("seed", range(101, 107))
 def test_vehicle_never_stands_in_the_oncoming_lane_beside_free_space(tmp_path: Path, seed: int) -> None:
-    """All cars between which it can overtake have passed after 46 s."""
+    """All cars between which it can overtake have passed after 46 s, unless it has overtaken before."""
     write_road(tmp_path)
     write(random_scene(seed), tmp_path / "scene.xosc")
     settings = RunSettings(criteria={"collision": {"of": "Ego", "name": "contact"}}, time_limit=50.0)
     run = run_of(Job(str(tmp_path / "scene.xosc"), "oracle", seed, settings))
-    assert run.met < 46.0
+    assert min(run.overtook, run.met) < 46.0
     assert run.idle == 0.0
     assert not run.collided
 

@@ -34,15 +34,21 @@ class SpeedLimits(msgspec.Struct, frozen=True):
     values: Array
     wanted: float
 
+    def at(self, s: Array) -> Array:
+        """Return the limits at distances along the line, with constant decelerations between its points [m/s]."""
+        return np.asarray(np.sqrt(np.interp(s, self.along, self.values**2)))
+
 
 class LimitsAhead:
-    """Speed limits within reach of a vehicle, interpolated between the points of the line."""
+    """Speed limits within reach of a vehicle; between the points of the line their squares are linear, as with constant
+    deceleration."""
 
     def __init__(self, along: Array, limits: Array) -> None:
+        squares = limits**2
         # The first and the last entry stand for what is before and beyond the points.
         self._along: list[float] = [float(along[0]) - BEFORE, *along.tolist()]
-        self._limits: list[float] = [float(limits[0]), *limits.tolist()]
-        self._slopes: list[float] = [0.0, *(np.diff(limits) / np.diff(along)).tolist(), 0.0]
+        self._squares: list[float] = [float(squares[0]), *squares.tolist()]
+        self._slopes: list[float] = [0.0, *(np.diff(squares) / np.diff(along)).tolist(), 0.0]
 
     @classmethod
     def of(cls, limits: SpeedLimits, s: float, reach: float) -> LimitsAhead | None:
@@ -52,10 +58,23 @@ class LimitsAhead:
         part = limits.values[first:last]
         return cls(limits.along[first:last], part) if float(part.min()) < limits.wanted else None
 
-    def at(self, s: float) -> float:
-        """Return the limit at a distance along the line [m/s]."""
+    def at(self, s: float) -> tuple[float, float]:
+        """Return the square of the limit at a distance along the line [m²/s²], and its derivative [m/s²]."""
         index = bisect_right(self._along, s) - 1
-        return self._slopes[index] * (s - self._along[index]) + self._limits[index]
+        slope = self._slopes[index]
+        return slope * (s - self._along[index]) + self._squares[index], slope
+
+
+def speed_after(square: float, slope: float, dt: float) -> float:
+    """Return the speed v at the end of a time step with constant acceleration, at which v² reaches a linear bound.
+
+    square  bound at the place that the vehicle reaches with half of its present speed [m²/s²]; slope  its derivative
+
+    The vehicle is v dt / 2 farther at the end: v² = square + slope v dt / 2.
+    """
+    half = 0.25 * slope * dt
+    root = half * half + square
+    return max(half + math.sqrt(root), 0.0) if root > 0.0 else 0.0
 
 
 def walls_over_time(walls: Sequence[Wall], times: list[float]) -> WallsOverTime:
@@ -83,24 +102,27 @@ class Bounds:
         self._bends = bends
         self._gain = gain
 
-    def allow(self, s: float, step: int) -> tuple[float, int]:
-        """Return the speed at a distance along the line [m/s], and what determines it."""
-        speed, cause = self.wanted, FREE
+    def allow(self, s: float, speed: float, step: int, dt: float) -> tuple[float, int]:
+        """Return the speed after a time step from a distance along the line [m] at a speed [m/s], and what determines
+        it."""
+        after, cause, gain = self.wanted, FREE, self._gain
+        middle = s + 0.5 * speed * dt
         if self._limits is not None:
-            limit = self._limits.at(s)
-            if limit < speed:
-                speed, cause = limit, LIMIT
+            limit = speed_after(*self._limits.at(middle), dt)
+            if limit < after:
+                after, cause = limit, LIMIT
         for begin, end, limit in self._bends:
-            if s < end:
-                limit = math.sqrt(limit**2 + self._gain * max(begin - s, 0.0))
-                if limit < speed:
-                    speed, cause = limit, LIMIT
+            if middle < end:
+                if middle < begin:
+                    limit = max(speed_after(limit**2 + gain * (begin - middle), -gain, dt), limit)
+                if limit < after:
+                    after, cause = limit, LIMIT
         if self._walls:
             for number, end in self._walls[step]:
-                allowed = math.sqrt(self._gain * max(end - s, 0.0))
-                if allowed < speed:
-                    speed, cause = allowed, number
-        return speed, cause
+                allowed = speed_after(gain * (end - middle), -gain, dt)
+                if allowed < after:
+                    after, cause = allowed, number
+        return after, cause
 
 
 ROLLED = 6
@@ -224,7 +246,7 @@ class Roller:
         for step, dt in enumerate(self._steps):
             cause = FREE
             if not is_free:
-                desired, cause = bounds.allow(s + speed * dt, step)
+                desired, cause = bounds.allow(s, speed, step, dt)
             acceleration = least if is_emergency else (desired - speed) / dt
             if acceleration > greatest:
                 acceleration = greatest

@@ -183,7 +183,7 @@ def _overrun(
             if waits.size:
                 overrun[index] = max(overrun[index], waits[-1] - max(wall.s, nearest) - STOPPING_ERROR)
         if proposal.deceleration < settings.hard_deceleration:
-            is_fast = (speed > np.interp(s, limits.along, limits.values) + TOO_FAST)[later].any()
+            is_fast = (speed > limits.at(s) + TOO_FAST)[later].any()
             if is_fast or _is_close(option, s, speed, scene, later, ego, settings):
                 overrun[index] = MOST_OVERRUN
     return np.asarray(np.minimum(overrun, MOST_OVERRUN))

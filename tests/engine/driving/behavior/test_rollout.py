@@ -96,12 +96,13 @@ def test_first_step_follows_the_leader_that_demands_the_hardest_braking(order: t
     assert rolled.cause[0, 0] == order.index(1)
 
 
-def test_limits_are_interpolated_and_only_those_within_reach_count() -> None:
+def test_squares_of_limits_are_interpolated_and_only_those_within_reach_count() -> None:
+    """With constant deceleration the square of the speed is linear."""
     along, values = np.array([0.0, 10.0, 30.0, 90.0]), np.array([20.0, 8.0, 12.0, 3.0])
     limits = LimitsAhead.of(SpeedLimits(along, values, 15.0), 5.0, 40.0)
     places = [-1.0, 0.0, 4.0, 10.0, 25.0, 45.0, 90.0, 95.0]
     assert limits is not None
-    assert [limits.at(s) for s in places] == pytest.approx(np.interp(places, along, values).tolist())
+    assert [limits.at(s)[0] for s in places] == pytest.approx(np.interp(places, along, values**2).tolist())
     assert LimitsAhead.of(SpeedLimits(along, values, 7.0), 5.0, 20.0) is None
 
 
@@ -118,6 +119,22 @@ def test_vehicle_waits_before_a_wall_until_its_end() -> None:
     assert (rolled.s[0, waiting] <= 60.0 + 0.05).all()
     assert rolled.s[0, waiting].min() > 57.0
     assert rolled.s[0, -1] > 200.0
+
+
+@pytest.mark.parametrize("place", [60.0, 60.3, 60.7])
+def test_stop_takes_the_comfortable_deceleration_at_any_time_step(place: float) -> None:
+    """At a wall, and at the end of a route; between multiples of the way of one time step, too."""
+    nothing = leader(900.0, 40.0)
+    at_wall = roll(FREE, 10.0, nothing, [Wall(place, math.inf, "stop")])
+    along = np.linspace(0.0, place, 61)
+    ends = speed_limits(np.zeros(61), np.append(np.full(60, 50.0), 0.0), place / 60.0, SETTINGS)
+    option = Option(FREE, LateralProfile("route", (0.0,), (0.0,)), [], np.zeros((1, len(TIMES)), bool), 0.0)
+    limits = SpeedLimits(along, ends, 15.0)
+    at_end = Roller(SETTINGS, TIMES, 4.5).roll([option], limits, (0.0, 10.0), BODY, nothing)
+    for rolled in (at_wall, at_end):
+        braking = -np.diff(rolled.speed[0]) / 0.25
+        assert braking.max() == pytest.approx(SETTINGS.comfortable_deceleration)
+        assert rolled.s[0, -1] == pytest.approx(place, abs=0.05)
 
 
 def test_emergency_braking_is_constant() -> None:
