@@ -515,7 +515,7 @@ class Decider:
         if verdict is Verdict.WAIT:
             sufficient = self._oncoming.place_with_view(profile, scene, beside.oncoming, situation.s)
             onward_speed = situation.speed_at(profile.places[-3], max(self._settings.acceleration, BRISK))
-            better = with_view(profile, situation.start, self._settings, sufficient, onward_speed)
+            better = with_view(profile, situation.start, self._settings, self._body, sufficient, onward_speed)
             if better is not None:
                 profile, waits_at = better, self._oncoming.waiting_place(better, situation.s)
             elif math.isinf(profile.waits_at):

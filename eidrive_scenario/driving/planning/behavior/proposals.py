@@ -234,14 +234,14 @@ def passing(
 
 
 def with_view(
-    profile: LateralProfile, start: Start, settings: BehaviorSettings, viewpoint: float, onward_speed: float
+    profile: LateralProfile, start: Start, settings: BehaviorSettings, body: Body, viewpoint: float, onward_speed: float
 ) -> LateralProfile | None:
     """Return a profile past an obstacle in two lateral motions, with a way at the edge of the lane between them, where
     the vehicle has a view into the oncoming lane.
 
     The result is None if there is not enough space, or if the profile has such a way already.
 
-    viewpoint  distance along the line from which the view is sufficient [m]
+    viewpoint  place of the front axle at which the view from the center of the vehicle is sufficient [m]
     onward_speed  speed beside the obstacle if the vehicle does not wait [m/s]
     """
     s, offset, slope, speed = start
@@ -259,7 +259,9 @@ def with_view(
     if math.isfinite(profile.waits_at) or onward is None:
         return None
     waits_at = min(viewpoint, onward)
-    first = max(waits_at - length, s)
+    # The vehicle looks from its center, which comes to the edge after the front axle.
+    at_edge = waits_at - (body.wheelbase - body.center)
+    first = max(at_edge - length, s)
     before = ((s, offset), (first, offset)) if first - s >= 1.0 else ((s, offset),)
     after = ((first + length, edge), (onward, edge), (begin, value), (end, value), (back, 0.0))
     places, values = zip(*before, *after, strict=True)

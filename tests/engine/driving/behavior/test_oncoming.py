@@ -223,14 +223,17 @@ def test_vehicle_waits_at_the_edge_of_its_lane_with_a_view() -> None:
     waiting = traffic(100.0)
     sufficient = waiting.place_with_view(PASSING, scene((40.0, 0.0, 0.0)), 3.5, -60.0)
     assert sufficient - BODY.wheelbase + BODY.center == pytest.approx(37.5 - 100.0 * 0.45 / 2.95, abs=0.3)
-    profile = with_view(PASSING, Start(-60.0, 0.0, 0.0, 5.0), SETTINGS, sufficient, 10.0)
+    profile = with_view(PASSING, Start(-60.0, 0.0, 0.0, 5.0), SETTINGS, BODY, sufficient, 10.0)
     assert profile is not None
-    assert profile.offset_at(waiting.waiting_place(profile, -60.0) + BODY.wheelbase) == pytest.approx(0.65, abs=0.01)
+    for part in (BODY.wheelbase, BODY.center):
+        assert profile.offset_at(waiting.waiting_place(profile, -60.0) + part) == pytest.approx(0.65, abs=0.01)
     # Before that it swings out at 10 m/s with 4 m/s²; the peak of the second derivative of the quintic is 10 / √3.
     length = 10.0 * math.sqrt(10.0 / math.sqrt(3.0) * 2.35 / 4.0)
     assert profile.waits_at == profile.places[-4] == pytest.approx(20.0 - length)
+    # If the lane is free it drives on: no motion is for less than the present speed.
+    assert min(bend.speed for bend in profile.bends(SETTINGS.lateral_acceleration, 10.0)) == pytest.approx(5.0)
     too_near = Start(12.0, 0.0, 0.0, 2.0)
-    assert with_view(PASSING, too_near, SETTINGS, sufficient, 2.0) is None, "there is not enough space"
+    assert with_view(PASSING, too_near, SETTINGS, BODY, sufficient, 2.0) is None, "there is not enough space"
 
 
 @pytest.mark.parametrize(
