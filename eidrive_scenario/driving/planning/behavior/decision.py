@@ -16,6 +16,7 @@ from eidrive_scenario.driving.planning.behavior.maneuvers import (
     extended,
     may_pass,
     passing_profiles,
+    sets_off,
     shortened,
 )
 from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT
@@ -510,6 +511,8 @@ class Decider:
         waits_at = self._oncoming.waiting_place(profile, situation.s)
         if verdict is Verdict.GO and not has_begun and not may_pass(situation, scene):
             verdict = Verdict.WAIT
+        elif verdict is Verdict.GO and not profile.overtakes and sets_off(situation, scene):
+            verdict = Verdict.GIVE_UP
         s = situation.center
         viewpoint = (s, profile.offset_at(s))
         if verdict is Verdict.WAIT:

@@ -566,6 +566,12 @@ def may_pass(situation: Situation, scene: Surroundings) -> bool:
     return blocker is None or _is_parked(situation, blocker)
 
 
+def sets_off(situation: Situation, scene: Surroundings) -> bool:
+    """Return whether what holds the vehicle up, and what stands close ahead of that, sets off before it is beside."""
+    blocker = _blocker(situation, scene)
+    return blocker is not None and blocker.rear > situation.front and _obstacle(situation, scene, blocker) is None
+
+
 def _is_parked(situation: Situation, hypothesis: Present) -> bool:
     """Return whether an object does not seem to have stopped just now, behind which the vehicle would wait."""
     known_object = situation.objects[hypothesis.owner]

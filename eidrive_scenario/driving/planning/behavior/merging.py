@@ -136,7 +136,7 @@ def costs_of_waiting(
     s = np.hstack([rolled.s[:, steps], np.minimum(rolled.s[:, -1:] + rolled.speed[:, -1:] * BEYOND, end)])
     speed = np.pad(rolled.speed[:, steps], ((0, 0), (0, len(BEYOND))), mode="edge")
     ahead = later(scene, steps, BEYOND)
-    gap = has_gap(ahead, offset, s, speed, body, MERGING_TIME_GAP) & (s <= last)
+    gap = has_gap(ahead, offset, s, speed, body, MERGING_TIME_GAP) & (s <= last + STOPPING_ERROR)
     gap &= leaves_room(ahead, offset, s, body, horizon)
     # A gap that passes by, faster or slower than the vehicle, is none: it has to last for some time.
     lasts = gap[:, :-1] & gap[:, 1:]

@@ -54,6 +54,28 @@ def test_row_of_obstacles_is_no_queue_and_passed_without_a_stop() -> None:
     assert min(run.speeds) > 3.0
 
 
+@pytest.mark.parametrize("start", [6.8, 7.8])
+def test_pass_of_a_queue_that_sets_off_is_given_up_in_the_own_lane(start: float) -> None:
+    """The first car hides the second one, which sets off first. The vehicle waits at the edge of its lane until 6.5 s,
+    and is beside the first car at 10 s."""
+
+    def car(place: float, time: float) -> KnownBox:
+        accelerates = min(max(time, 0.0), 4.0)
+        return KnownBox(place + 1.1 * accelerates**2 + 8.8 * max(time - 4.0, 0.0), vx=2.2 * accelerates)
+
+    def queue(now: float) -> list[KnownBox]:
+        cars = [car(80.0, now - start - 1.5), car(88.0, now - start)]
+        return cars if run.path and run.path[-1][0] > 55.0 else cars[:1]
+
+    roads = two_lane_road()
+    run = PlannedDrive(behavior(roads), roads)
+    run.run(20.0, queue)
+    run.world.close()
+    assert any("pass car" in plan.reason for plan in run.plans[130:])
+    assert max(y for _, y, _ in run.path) + CAR.size[1] / 2.0 < 0.1, "in its lane, within the error of the control"
+    assert run.front < queue(20.0)[0].x - 2.25
+
+
 def test_pedestrian_along_the_lane_is_overtaken() -> None:
     roads = two_lane_road()
     run = PlannedDrive(behavior(roads), roads)

@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from eidrive_scenario.driving.planning.behavior.merging import costs_of_waiting
 from eidrive_scenario.driving.planning.behavior.proposals import (
     Body,
     LateralProfile,
@@ -17,7 +18,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     inside_way,
 )
 from eidrive_scenario.driving.planning.behavior.rollout import Rollout, SpeedLimits
-from eidrive_scenario.driving.planning.behavior.scoring import Evaluation, Options, evaluate
+from eidrive_scenario.driving.planning.behavior.scoring import WEIGHTS, Evaluation, Options, evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings
 
@@ -88,6 +89,16 @@ def test_stop_behind_its_place_costs_by_distance_unless_none_is_possible(
     scene = crossing_car(0.0, 0.0, yields=True).rows(np.empty(0, dtype=np.intp))
     free, stopped = evaluate(options, rolled, scene, TIMES, body, SETTINGS, limits=LIMITS, kept=kept).score
     assert free - stopped == pytest.approx(cost)
+
+
+@pytest.mark.parametrize(("beyond", "more"), [(0.4, 0.0), (0.6, WEIGHTS.gap + WEIGHTS.refused)])
+def test_stop_within_its_error_of_the_end_of_a_lane_has_a_gap_beside(beyond: float, more: float) -> None:
+    """The other lane is free. A stop may be 0.5 m too far; farther there is no space to change lanes."""
+    s = np.array([[0.0], [beyond]]) * np.ones(len(TIMES))
+    rolled = Rollout(s, 0.0 * s, np.full((2, 4), -1))
+    scene = crossing_car(0.0, 0.0, yields=True).rows(np.empty(0, dtype=np.intp))
+    before, behind = costs_of_waiting(3.5, rolled, scene, TIMES, 1.0, Body(1.4, 2.4, 0.9, 2.85), (0.0, 100.0))
+    assert behind - before == pytest.approx(more)
 
 
 @pytest.mark.parametrize(("gap", "cost"), [(25.6, 0.0), (25.4, 3.0)])
