@@ -16,7 +16,9 @@ class RunningRedLightSettings(StopLineSettings):
 class RunningRedLight(StopLineCriterion):
     """Criterion that fails if the actor crosses the stop line of a traffic light that shows red.
 
-    The state in the frame before the crossing counts. A light whose state the scenario never sets shows nothing.
+    The state in the frame before the crossing counts. A light whose state the scenario never sets shows nothing. The
+    light of a connecting road counts at the line if the route of the actor takes this road, or if all connecting roads
+    of its lane show red, otherwise once the actor has taken this road.
     """
 
     settings_type = RunningRedLightSettings
@@ -35,7 +37,16 @@ class RunningRedLight(StopLineCriterion):
         if roads is not None:
             self._colors = {line.signal: lamp_colors(roads.signals[line.signal]) for line in self.crossings.lines}
 
+    def observe(self, frame: Frame) -> None:
+        if self.of in frame.routes:
+            self.crossings.set_route(frame.routes[self.of])
+        super().observe(frame)
+
     def approach(self, frame: Frame, row: int, point: tuple[float, float]) -> None:
+        violation = self.crossings.decide_at_line(frame.view.time, self.is_illegal)
+        if violation is not None:
+            self._passed += 1
+            self._illegal.append(violation)
         signals, colors = frame.signals, self._colors
         red = frozenset(name for name, state in signals.items() if name in colors and shows_red(state, colors[name]))
         if not self._red or self._red[-1][1] != red:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import segment_distance
 from eidrive_scenario.base.tolerances import EPSILON
-from eidrive_scenario.perception.traffic_lights import ON_PATH, SAME_WAY, StopLine, stop_lines
-from eidrive_scenario.roads import OTHER_LEVEL, RoadNetwork
+from eidrive_scenario.perception.traffic_lights import ON_PATH, SAME_WAY, StopLine, places_along, stop_lines
+from eidrive_scenario.roads import OTHER_LEVEL, LaneKey, RoadNetwork
 from eidrive_scenario.sensing.signals import Kind
 
 NEAR = 30.0
@@ -40,13 +43,28 @@ class StopLineCrossings:
     """Crossings of the stop lines of one kind of signal, in the direction of their traffic.
 
     A line at the entry of a junction that is valid for one connecting road only counts once the point reaches the
-    middle of that road, with the time at which it crossed the line.
+    middle of that road, with the time at which it crossed the line. It does not count if the point leaves the junction
+    backwards over the line.
     """
 
     def __init__(self, roads: RoadNetwork, kind: Kind) -> None:
         self.lines = tuple(line for line in stop_lines(roads) if line.kind == kind)
         self._positions = np.array([(line.x, line.y) for line in self.lines]).reshape(-1, 2)
         self._pending: list[_Pending] = []
+        self._roads = roads
+        self._on_route: list[StopLine] = []
+        """Lines with a connecting road on the newest route that the actor has not taken yet."""
+
+    def set_route(self, route: Array) -> None:
+        """Set the points (M, 3) of the newest route of the actor [m]."""
+        segments = list(pairwise(route[:, :2].tolist()))
+        self._on_route = [
+            line
+            for _, line in places_along(self.lines, route[:, :2], route[:, 2])
+            # A route that ends before the middle of the connecting road does not determine this road
+            if line.beyond is not None
+            and min(segment_distance(*line.beyond, *begin, *end) for begin, end in segments) <= ON_PATH
+        ]
 
     def interrupt(self) -> None:
         """Forget undecided crossings, after an absence or a teleport."""
@@ -79,6 +97,27 @@ class StopLineCrossings:
                 self._pending.append(_Pending(line, time, left))
         return list({crossing.signal: crossing for crossing in reversed(crossings)}.values())
 
+    def decide_at_line(self, time: float, is_illegal: Callable[[Crossing], bool]) -> Crossing | None:
+        """Return a crossing of this time [s] that is illegal on all connecting roads that the actor may take, or None.
+
+        They are those of its route, otherwise all that continue its lane. A connecting road without a signal is legal.
+        The undecided crossings of all these roads are then decided.
+        """
+        newest = [pending for pending in self._pending if pending.time == time]
+        entries = {entry for pending in newest for entry in _alternatives(self._roads, pending.line)}
+        if not entries:
+            return None
+        possible = entries & {line.entry for line in self._on_route} or entries
+        illegal = {
+            pending.line.entry: crossing
+            for pending in self._pending
+            if pending.line.entry in possible and is_illegal(crossing := Crossing(pending.line.signal, pending.time))
+        }
+        if len(illegal) < len(possible):
+            return None
+        self._pending = [each for each in self._pending if each not in newest and each.line.entry not in entries]
+        return max(illegal.values(), key=lambda crossing: crossing.time)
+
     def _decide(self, before: Point, now: Point) -> list[Crossing]:
         """Return the crossings whose route has become certain; drop those of other routes."""
         crossings: list[Crossing] = []
@@ -88,11 +127,27 @@ class StopLineCrossings:
             left = pending.left - math.dist(before, now)
             if segment_distance(*pending.line.beyond, *before, *now) <= ON_PATH:
                 crossings.append(Crossing(pending.line.signal, pending.time))
-            elif left > 0.0:
+            elif left > 0.0 and not crosses(pending.line, now, before, pending.line.heading):
                 kept.append(pending._replace(left=left))
         decided = {crossing.signal for crossing in crossings}
+        self._on_route = [
+            line for line in self._on_route if line.beyond and segment_distance(*line.beyond, *before, *now) > ON_PATH
+        ]
         self._pending = [pending for pending in kept if pending.line.signal not in decided]
         return crossings
+
+
+def _alternatives(roads: RoadNetwork, line: StopLine) -> set[LaneKey]:
+    """Return the lanes of connecting roads that continue the lane of a stop line; empty if the map links none."""
+    assert line.entry is not None
+    against = -roads.driving_direction(line.entry.road, line.entry.lane)
+    return {
+        lane
+        for incoming, backwards in roads.links.beyond(line.entry, against)
+        for lane, onwards in roads.links.beyond(incoming, -backwards)
+        if onwards == roads.driving_direction(lane.road, lane.lane)
+        and roads.roads[lane.road].sections[lane.section].lanes[lane.lane].drivable
+    }
 
 
 def crosses(line: StopLine, before: Point, now: Point, heading: float) -> bool:

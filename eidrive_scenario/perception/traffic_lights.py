@@ -34,6 +34,7 @@ class StopLine(NamedTuple):
     x, y, z   on the center of the lane [m];  heading  of its traffic [rad]
     way       points from the start of a connecting road to its middle, which only the routes with this signal pass,
               unless they end before it; empty if the line alone determines them
+    entry     lane at the start of this connecting road; None without one
     """
 
     signal: str
@@ -43,6 +44,7 @@ class StopLine(NamedTuple):
     z: float
     heading: float
     way: tuple[tuple[float, float], ...]
+    entry: LaneKey | None
 
     @property
     def beyond(self) -> tuple[float, float] | None:
@@ -125,6 +127,7 @@ def _lines(roads: RoadNetwork, signal: Signal, kind: Kind, place: SignalPlace) -
     for number in roads.signal_lanes(place):
         direction = roads.driving_direction(road.id, number)
         way: tuple[tuple[float, float], ...] = ()
+        entry: LaneKey | None = None
         if road.junction_id is None:
             pose = roads.lane_pose_at(road.id, number, place.s)
         else:
@@ -145,7 +148,7 @@ def _lines(roads: RoadNetwork, signal: Signal, kind: Kind, place: SignalPlace) -
             aside = abs(dy * math.cos(heading) - dx * math.sin(heading))
             back = before if 0.0 < before < NEAR_SIDE and aside < NEAR_SIDE else 0.0
         x, y = pose.x - back * math.cos(heading), pose.y - back * math.sin(heading)
-        yield StopLine(signal.id, kind, x, y, pose.z, heading, way)
+        yield StopLine(signal.id, kind, x, y, pose.z, heading, way, entry)
 
 
 def places_along(

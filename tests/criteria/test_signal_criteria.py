@@ -1,6 +1,9 @@
 """Criteria on stop lines, on road 1 of scenario 1: a stop sign with its line at x = 15.6 m; boxes 4 m by 2 m."""
 
 import math
+from collections.abc import Iterable, Sequence
+from copy import deepcopy
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -31,18 +34,20 @@ def sign(**settings: Any) -> RunningStopSign:
     return RunningStopSign(RunningStopSignSettings(of="Ego", **settings))
 
 
-def lights(road: str = "1") -> RoadNetwork:
-    """Return the roads with a traffic light `10` instead of the stop sign, on road 1 or on a connecting road."""
+def lights(*connecting: str) -> RoadNetwork:
+    """Return the roads with a traffic light `10` instead of the stop sign, or with `10`, `11`, … on connections."""
     root = etree.parse(ROAD).getroot()
     signal = next(element for element in root.iter("signal") if element.get("id") == "10")
     signal.set("dynamic", "yes")
     signal.set("type", "1000001")
-    if road != "1":
+    for number, road in enumerate(connecting, 10):
         target = next(element for element in root.iter("road") if element.get("id") == road)
         signal.set("s", "1.0")
+        signal.set("id", str(number))
         for old in target.findall("signals"):
             target.remove(old)
         etree.SubElement(target, "signals").append(signal)
+        signal = deepcopy(signal)
     return RoadNetwork.parse(etree.tostring(root))
 
 
@@ -119,6 +124,113 @@ def test_red_light_counts_for_a_route_that_is_certain_minutes_later(frame: Any, 
     verdict = judge(light(), frames, roads)
     assert (verdict.passed, verdict.value) == (False, 1.0)
     assert verdict.first_violation == pytest.approx(0.9), "the front is at the line when the center is at 18 m"
+
+
+def entering(frame: Any, car: Any, places: Iterable[float], states: Sequence[str], route: str = "") -> list[Frame]:
+    """Return frames each 0.1 s with the center at places x [m] of lane y = 0; the lights `10`, `11`, … have `states`.
+
+    The stop line of lights on the roads 101 (straight), 102 (right) and 103 (left) is at x = 20 m.
+
+    route  connecting road of the route that is requested in the first frame; empty for none
+    """
+    signals = dict(zip(("10", "11", "12"), states, strict=False))
+    frames = [frame(0.1 * n, {"Ego": car(x, 0.0, speed=10.0)}, signals=signals) for n, x in enumerate(places)]
+    if route:
+        network = lights()
+        start, end = network.location("1", -1, 50.0), network.location(route, -1, network.roads[route].length)
+        frames[0] = replace(frames[0], routes={"Ego": network.route(start, end).polyline(2.0)})
+    return frames
+
+
+@pytest.mark.parametrize(
+    ("states", "route", "is_violation"),
+    [
+        (["red"], "101", True),
+        (["red"], "103", False),
+        (["red"], "", False),  # 102 and 103 have no light
+        (["red", "red"], "", False),  # 103 has none
+        (["red", "red", "red"], "", True),
+        (["red", "red", "red"], "102", True),
+        (["red", "green", "red"], "", False),
+        (["red", "green", "red"], "101", True),
+        (["red", "green", "red"], "102", False),
+        (["green", "red", "green"], "102", True),  # an arrow for the right turn only
+        (["red", "off", "red"], "", False),
+        (["red", "yellow", "red"], "", False),
+        (["red", "flashing;off;off", "red"], "", True),
+    ],
+)
+def test_red_light_at_the_line_depends_on_route_or_all_ways(
+    frame: Any, car: Any, states: list[str], route: str, is_violation: bool
+) -> None:
+    """The front passes the line at 20 m after 0.8 s, when the center is at 18 m, and stays 2 m behind it."""
+    roads = lights(*("101", "102", "103")[: len(states)])
+    criterion = light()
+    verdict = judge(criterion, entering(frame, car, [10.0 + n for n in range(11)], states, route), roads)
+    assert (verdict.passed, verdict.value) == (not is_violation, float(is_violation))
+    assert verdict.first_violation == (pytest.approx(0.9) if is_violation else None)
+    assert criterion.metrics()["running_red_light.passed"] == float(is_violation), "other crossings are undecided"
+
+
+@pytest.mark.parametrize(("part", "time"), [("front", 0.9), ("rear", 1.3)])
+@pytest.mark.parametrize("route", ["", "101"])
+def test_red_light_at_the_line_counts_each_crossing_once(
+    frame: Any, car: Any, route: str, part: str, time: float
+) -> None:
+    """The actor enters, reverses to 10 m, and drives 40 m: past the middle of road 101 at 37.25 m."""
+    places = [float(x) for x in (*range(10, 25), *range(23, 9, -1), *range(11, 51))]
+    roads, states = lights("101", "102", "103"), ["red", "red", "red"]
+    criterion = light(part=part)
+    verdict = judge(criterion, entering(frame, car, places, states, route), roads)
+    assert (verdict.passed, verdict.value) == (False, 2.0)
+    assert verdict.first_violation == pytest.approx(time)
+    assert criterion.metrics()["running_red_light.passed"] == 2.0
+    assert judge(light(part=part), entering(frame, car, places[:15], states, route), roads).value == 1.0
+
+
+def test_crossing_at_red_left_backwards_is_undecided(frame: Any, car: Any) -> None:
+    """The first crossing is at red, 102 and 103 have no light; the second, 6 m later, is at green."""
+    places = [float(x) for x in (*range(10, 21), *range(19, 14, -1), *range(16, 51))]
+    frames = entering(frame, car, places, ["red"])
+    frames[15:] = [replace(each, signals={"10": "green"}) for each in frames[15:]]
+    verdict = judge(light(), frames, lights("101"))
+    assert (verdict.passed, verdict.value) == (True, 0.0)
+    assert verdict.reason == "Ego passed 1 stop lines, all legally"
+
+
+@pytest.mark.parametrize("route", ["", "101"])
+@pytest.mark.parametrize("places", [[25.0 + n for n in range(20)], [10.0, 21.0, 21.1]], ids=["inside", "teleport"])
+def test_red_light_without_a_crossing_of_the_line(frame: Any, car: Any, places: list[float], route: str) -> None:
+    frames = entering(frame, car, places, ["red", "red", "red"], route)
+    frames = [replace(each, view=replace(each.view, speed=np.array([1.0]))) for each in frames]
+    assert judge(light(), frames, lights("101", "102", "103")).value == 0.0
+
+
+def test_red_light_while_the_front_is_over_the_line_is_no_violation(frame: Any, car: Any) -> None:
+    """The front is over the line from 0.9 s on; the lights turn red in this frame."""
+    frames = entering(frame, car, [10.0 + n for n in range(11)], ["green", "green", "green"], "101")
+    red = dict.fromkeys(("10", "11", "12"), "red")
+    for first, value in ((9, 0.0), (8, 1.0)):
+        changed = [*frames[:first], *(replace(each, signals=red) for each in frames[first:])]
+        assert judge(light(), changed, lights("101", "102", "103")).value == value
+
+
+def test_route_counts_once_for_a_connecting_road(frame: Any, car: Any) -> None:
+    """The route over 101 is driven at green; after a loop beside the road, the second entry at red is left open."""
+    corners = [(10, 0), (60, 0), (60, 60), (10, 60), (10, 0), (22, 0)]
+    loop = [corners[0]]
+    for (x0, y0), (x1, y1) in pairwise(corners):
+        steps = abs(x1 - x0) + abs(y1 - y0)
+        loop += [(x0 + (x1 - x0) * n // steps, y0 + (y1 - y0) * n // steps) for n in range(1, steps + 1)]
+    frames = entering(frame, car, [float(x) for x, _ in loop], ["green"], "101")
+    for n, (x, y) in enumerate(loop):
+        state = {"10": "green" if n < 100 else "red"}
+        frames[n] = replace(frame(0.1 * n, {"Ego": car(x, y, speed=10.0)}, signals=state), routes=frames[n].routes)
+    assert judge(light(), frames, lights("101")).value == 0.0
+    again = replace(frames[100], routes=frames[0].routes)
+    verdict = judge(light(), [*frames[:100], again, *frames[101:]], lights("101"))
+    assert verdict.value == 1.0
+    assert verdict.first_violation == pytest.approx(0.1 * (50 + 60 + 50 + 60 + 9))
 
 
 def approach(frame: Any, car: Any, stop: float | None, ticks: int = 1, speed: float = 0.0) -> list[Frame]:
