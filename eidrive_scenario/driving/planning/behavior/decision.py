@@ -59,7 +59,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
 from eidrive_scenario.driving.planning.behavior.rollout import BRISK, FREE, LIMIT, WALL, Roller, Rollout
 from eidrive_scenario.driving.planning.behavior.scoring import AT_REST, URGENT, Options, evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
-from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, only_certain, surroundings
+from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, only, surroundings
 from eidrive_scenario.driving.planning.behavior.walking_pace import WalkingPace
 from eidrive_scenario.world.actor import ActorSpec
 
@@ -264,7 +264,13 @@ class Decider:
             if not expects:
                 options = self._options(situation, scene, profiles, with_maneuvers=True)
             best = options.best()
-        best = self._with_brake(options, self._kept(options, best, situation.now))
+        best = self._kept(options, best, situation.now)
+        if options.options[best].proposal.is_emergency and not bool(scene.likely.all()):
+            # The vehicle brakes hard for a turn that is possible only, but not as in an emergency.
+            likely = self._options(situation, only(scene, scene.likely), [options.options[0].profile])
+            if not likely.options[likely.best()].proposal.is_emergency:
+                best = options.best(name=options.options[best].profile.name, with_brake=False)
+        best = self._with_brake(options, best)
         if not bool(scene.certain.all()):
             is_hard = self._acceleration(options, best) < -settings.comfortable_deceleration - HARDER
             threat = options.uncertain_threat(best, scene.certain, is_hard=is_hard)
@@ -323,7 +329,7 @@ class Decider:
         self, situation: Situation, scene: Surroundings, options: Options, threat: int
     ) -> Decision:
         """Return the decision if a hypothesis of uncertain existence is no reason for more than a gentle stop."""
-        certain = self._options(situation, only_certain(scene), [options.options[0].profile])
+        certain = self._options(situation, only(scene, scene.certain), [options.options[0].profile])
         choice, stop = int(np.argmax(certain.evaluation.score)), certain.gentle
         if self._acceleration(certain, choice) < self._acceleration(certain, stop):
             return self._decision(situation, certain, choice)

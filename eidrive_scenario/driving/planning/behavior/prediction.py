@@ -44,7 +44,8 @@ STOPPING = 2.0
 AT_SIGN = 1.0
 """Distance of the front from a sign within which the vehicle has stopped there or passes it [m]."""
 SIMILAR_TURN = 0.6
-"""Maximum difference to its smallest turn of other turns that a vehicle which gives way is expected to take [rad]."""
+"""Maximum difference to the smallest turn of a vehicle of other turns that are likely [rad]. It is expected to take no
+others if it gives way, and they are no reason for emergency braking before it enters the junction."""
 HARSH = math.sqrt(7.0 / FASTEST_TURN)
 """Ratio of the speeds in a curve at the limit of the tires (0.7 g) and at that of comfort. A vehicle that has been
 predicted to follow a lane may be that fast."""
@@ -58,6 +59,7 @@ class Prediction(msgspec.Struct, frozen=True):
     objects  (N,) index of the object;  x, y, yaw, speed  (N, K) [m, rad, m/s]
     room     (N,) distance of the center from the nearer edge of the lane that it follows, inf for other objects [m]
     passages  of junctions ahead, for each hypothesis
+    likely    (N,) whether it is no much larger turn in a junction ahead than another hypothesis of the object
     z         (N, K) height of the lower side of the object [m]; None if all roads are level
     """
 
@@ -68,6 +70,7 @@ class Prediction(msgspec.Struct, frozen=True):
     speed: Array
     room: Array
     passages: tuple[tuple[Passage, ...], ...] = ()
+    likely: tuple[bool, ...] = ()
     z: Array | None = None
 
 
@@ -80,6 +83,8 @@ class Hypothesis(NamedTuple):
     passages: tuple[Passage, ...] = ()
     z: Array | None = None
     """Height of the road that it follows (K,) [m]; None: it follows none, or all roads are level."""
+    likely: bool = True
+    """Whether it is no much larger turn in a junction ahead than another hypothesis."""
 
 
 class Predictor:
@@ -136,6 +141,7 @@ class Predictor:
             speed,
             np.array([hypothesis.room for hypothesis in hypotheses]),
             tuple([hypothesis.passages for hypothesis in hypotheses]),
+            tuple([hypothesis.likely for hypothesis in hypotheses]),
             None if self._level else self._heights(objects, owners, hypotheses),
         )
 
@@ -170,9 +176,9 @@ class Predictor:
         leaving: list[Hypothesis] = []
         """Along lanes that the vehicle leaves, crosses or is beside of: only if it follows no lane."""
         followed: list[Course] = []
-        deviations: list[tuple[float, float]] = []
-        """Lateral speeds from the lanes that it follows [m/s], and largest turns with which it gives way to the ego
-        [rad], -inf if it does not."""
+        deviations: list[tuple[float, float, float]] = []
+        """Lateral speeds from the lanes that it follows [m/s], largest turns with which it gives way to the ego [rad],
+        -inf if it does not, and largest turns in junctions that it has not entered [rad]."""
         direction = math.atan2(known_object.vy, known_object.vx)
         noise = known_object.speed_error
         # A vehicle that accelerates does so until its driver reacts to a curve.
@@ -215,16 +221,18 @@ class Predictor:
             if fitting is following:
                 followed.append(course)
                 turns = [abs(passage.turn) for passage in ahead if defers is not None and defers(passage)]
-                deviations.append((abs(aside), max(turns, default=-math.inf)))
+                coming_turns = [abs(passage.turn) for passage in ahead if passage.start > along]
+                deviations.append((abs(aside), max(turns, default=-math.inf), max(coming_turns, default=0.0)))
             if len(following) == MOST_HYPOTHESES:
                 break
         known_object.followed = followed
         # It is expected to turn before the ego only if it leaves its lane, in the direction of the turn.
-        usual = min((turn for _, turn in deviations), default=0.0) + SIMILAR_TURN
-        least = min((deviation for deviation, turn in deviations if turn <= usual), default=math.inf)
+        usual = min((turn for _, turn, _ in deviations), default=0.0) + SIMILAR_TURN
+        least = min((deviation for deviation, turn, _ in deviations if turn <= usual), default=math.inf)
+        likely = min((coming for *_, coming in deviations), default=0.0) + SIMILAR_TURN
         following = [
-            hypothesis
-            for hypothesis, (deviation, turn) in zip(following, deviations, strict=True)
+            hypothesis._replace(likely=coming <= likely)
+            for hypothesis, (deviation, turn, coming) in zip(following, deviations, strict=True)
             if turn <= usual or least > max(steady, deviation)
         ]
         return following or too_fast or leaving[:MOST_HYPOTHESES] or [_straight_on(known_object, travelled, speed)]

@@ -364,22 +364,23 @@ class Options(msgspec.Struct, frozen=True):
             return self.options[index].walls[WALL - cause].owner
         return cause if cause >= 0 else None
 
-    def best(self, profiles: int | None = None, name: str | None = None) -> int:
+    def best(self, profiles: int | None = None, name: str | None = None, *, with_brake: bool = True) -> int:
         """Return the index of the option with the highest score, among those along the first `profiles` or of one
         maneuver.
 
-        The emergency brake is one of them only if the best other one collides soon, or has a risk as of a near contact.
+        With the emergency brake, that is one of them if the best other one collides soon, or has a risk as of a near
+        contact.
         """
         count = len(self.options) if profiles is None else profiles
         counts = [option.proposal.profile < count and name in (None, option.profile.name) for option in self.options]
         score = np.where(counts, self.evaluation.score, -math.inf)
         brake = max(self.emergencies, key=score.__getitem__)
-        with_brake = float(score[brake])
+        braking = float(score[brake])
         score[self.emergencies] = -math.inf
         best = int(np.argmax(score))
         collision, risk = float(self.evaluation.collision[best]), float(self.evaluation.risk[best])
         is_urgent = collision < URGENT or risk > 1.0 - FARTHER * URGENT / self.horizon
-        return brake if is_urgent and with_brake > score[best] else best
+        return brake if with_brake and is_urgent and braking > score[best] else best
 
     def uncertain_threat(self, best: int, certain: Bools, *, is_hard: bool) -> int | None:
         """Return the hypothesis of an object of uncertain existence for which a proposal brakes hard, if there is one.

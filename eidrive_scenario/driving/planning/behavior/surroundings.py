@@ -48,6 +48,7 @@ class Surroundings(msgspec.Struct, frozen=True, dict=True):
 
     s, d, half_length, half_width  (N, K) [m];  speed  (N, K) along the line [m/s];  margin  (N,) to the side [m]
     owner  (N,) index of the object;  certain  (N,) whether its existence is certain enough for hard braking
+    likely  (N,) whether it is likely enough for emergency braking: no large turn in a junction ahead of it
     passing_gap  (N,) additional gap behind what stands [m]
     crosses  (N, K) whether it moves across the line;  behind  (N,) whether it follows the ego in its lane
     yields   (N,) whether the ego gives way to it at a junction
@@ -61,6 +62,7 @@ class Surroundings(msgspec.Struct, frozen=True, dict=True):
     margin: Array
     owner: tuple[int, ...]
     certain: Bools
+    likely: Bools
     passing_gap: Array
     crosses: Bools
     behind: Bools
@@ -152,6 +154,7 @@ def surroundings(
         margin,
         prediction.objects,
         np.array([owner.existence >= settings.min_existence for owner in owners], dtype=bool),
+        np.array(prediction.likely, dtype=bool),
         np.array([settings.passing_gap * (owner.still_since is not None) for owner in owners]),
         moving & (ahead < ACROSS),
         behind,
@@ -182,7 +185,6 @@ def _yields(prediction: Prediction, gives_way: Callable[[Passage], bool] | None)
     return np.array([any(map(gives_way, passages)) for passages in prediction.passages], dtype=bool)
 
 
-def only_certain(scene: Surroundings) -> Surroundings:
-    """Return the scene without objects of low existence probability, which neither lead nor collide."""
-    aside = np.where(scene.certain[:, None], scene.d, AWAY)
-    return msgspec.structs.replace(scene, d=aside)
+def only(scene: Surroundings, kept: Bools) -> Surroundings:
+    """Return the scene without the hypotheses that are not kept (N,), which neither lead nor collide."""
+    return msgspec.structs.replace(scene, d=np.where(kept[:, None], scene.d, AWAY))

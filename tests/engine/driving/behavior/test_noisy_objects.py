@@ -174,7 +174,7 @@ def test_errors_of_a_standing_vehicle_end_beside_the_ego(
         at = np.ones((1, 2))
         return Surroundings(
             *(s * at, -offset * at, 2.5 * at, (1.05 + more) * at, speed * at, np.array([0.5]), (0,)),
-            *(np.ones(1, dtype=bool), np.zeros(1), np.zeros((1, 2), dtype=bool)),
+            *(np.ones(1, dtype=bool), np.ones(1, dtype=bool), np.zeros(1), np.zeros((1, 2), dtype=bool)),
             *(np.zeros(1, dtype=bool), np.zeros(1, dtype=bool)),
         )
 

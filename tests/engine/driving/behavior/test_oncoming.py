@@ -45,6 +45,7 @@ def scene(*objects: tuple[float, float, float]) -> Surroundings:
         np.full(count, 0.4),
         tuple(range(count)),
         np.ones(count, dtype=bool),
+        np.ones(count, dtype=bool),
         np.zeros(count),
         np.zeros((count, steps), dtype=bool),
         np.zeros(count, dtype=bool),

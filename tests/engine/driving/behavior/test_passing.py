@@ -55,7 +55,7 @@ def test_row_of_obstacles_is_no_queue_and_passed_without_a_stop() -> None:
 
 
 @pytest.mark.parametrize("start", [6.8, 7.8])
-def test_pass_of_a_queue_that_sets_off_is_given_up_in_the_own_lane(start: float) -> None:
+def test_pass_of_a_queue_that_sets_off_is_given_up(start: float) -> None:
     """The first car hides the second one, which sets off first. The vehicle waits at the edge of its lane until 6.5 s,
     and is beside the first car at 10 s."""
 

@@ -249,7 +249,17 @@ def test_only_vehicle_with_the_right_of_way_may_turn_before_a_junction(defers: b
     roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
     box = KnownBox(43.8, -32.0, vy=6.0, yaw=math.pi / 2.0)
     prediction = Predictor(roads, TIMES).predict(known(box), defers=lambda passage: defers)
-    assert set(np.round((prediction.yaw[:, -1] - math.pi / 2.0) / (math.pi / 2.0)).tolist()) == turns
+    quarters = np.round((prediction.yaw[:, -1] - math.pi / 2.0) / (math.pi / 2.0))
+    assert set(quarters.tolist()) == turns
+    assert quarters[list(prediction.likely)].tolist() == [0.0]
+
+
+def test_each_turn_of_a_vehicle_in_a_junction_is_likely() -> None:
+    roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
+    box = KnownBox(43.8, -8.0, vy=6.0, yaw=math.pi / 2.0)
+    prediction = Predictor(roads, TIMES).predict(known(box))
+    assert len(prediction.likely) > 1
+    assert all(prediction.likely)
 
 
 @pytest.mark.parametrize(("acceleration", "turns"), [(0.0, True), (1.0, False)])

@@ -192,6 +192,24 @@ def test_vehicle_brakes_comfortably_for_traffic_from_the_right(later: float) -> 
     assert enters < arrival + 4.5
 
 
+def test_possible_turn_of_a_late_car_causes_no_emergency_braking() -> None:
+    """A car from the right with the right of way appears when the vehicle is 17 m before its way, from 10 m/s a stop
+    with 2.9 m/s². If it turned left, the vehicle would have to stop earlier."""
+    roads = RoadNetwork.load(ROADS / "four_way_junction.xodr")
+    run = PlannedDrive(behavior(roads, 10.0), roads, speed=10.0, start=-30.0, y=0.0)
+    appears = (43.8 - 1.0 - FRONT - 17.0 + 30.0) / 10.0
+
+    def seen(now: float) -> list[KnownBox]:
+        car = KnownBox(43.8, -28.0 + 10.0 * (now - appears), vy=10.0, yaw=math.pi / 2.0)
+        return [car] if now >= appears else []
+
+    run.run(20.0, seen)
+    run.world.close()
+    speeds = np.array(run.speeds)
+    assert 2.0 < ((speeds[:-10] - speeds[10:]) / 0.5).max() < 4.05
+    assert not any(reason.startswith("emergency braking") for reason in run.reasons)
+
+
 @pytest.mark.parametrize("speed", [4.0, 6.0])
 def test_vehicle_with_priority_stops_for_a_car_that_turns_before_it(speed: float) -> None:
     """The car begins the turn 2 s before the vehicle would enter the junction."""

@@ -31,10 +31,8 @@ def leader(gap: float, speed: float) -> Surroundings:
     shape = (1, len(TIMES))
     s = (BODY.front + gap + 2.5 + speed * TIMES)[None]
     ones = np.ones(shape)
-    still, no = np.zeros(1), np.zeros(1, bool)
-    return Surroundings(
-        s, 0 * ones, 2.5 * ones, ones, speed * ones, still, (0,), np.ones(1, bool), still, ones < 0, no, no
-    )
+    still, yes, no = np.zeros(1), np.ones(1, bool), np.zeros(1, bool)
+    return Surroundings(s, 0 * ones, 2.5 * ones, ones, speed * ones, still, (0,), yes, yes, still, ones < 0, no, no)
 
 
 def roll(

@@ -40,6 +40,7 @@ def crossing_car(place: float, arrival: float, *, yields: bool) -> Surroundings:
         np.full(1, SETTINGS.lateral_margin),
         (0,),
         np.ones(1, bool),
+        np.ones(1, bool),
         np.zeros(1),
         ones > 0,
         no,
@@ -92,7 +93,7 @@ def test_stop_behind_its_place_costs_by_distance_unless_none_is_possible(
 
 
 @pytest.mark.parametrize(("beyond", "more"), [(0.4, 0.0), (0.6, WEIGHTS.gap + WEIGHTS.refused)])
-def test_stop_within_its_error_of_the_end_of_a_lane_has_a_gap_beside(beyond: float, more: float) -> None:
+def test_stop_within_its_error_of_the_last_place_has_a_gap(beyond: float, more: float) -> None:
     """The other lane is free. A stop may be 0.5 m too far; farther there is no space to change lanes."""
     s = np.array([[0.0], [beyond]]) * np.ones(len(TIMES))
     rolled = Rollout(s, 0.0 * s, np.full((2, 4), -1))
