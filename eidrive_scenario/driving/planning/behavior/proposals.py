@@ -35,6 +35,8 @@ WALKING_PACE = 2.0
 """Least speed for which lateral motions are made [m/s]; in a traffic-calmed area German courts accept 4 to 7 km/h."""
 AT_OFFSET = 0.1
 """Difference to an offset up to which the vehicle is there [m]; its control has errors of this size."""
+SHORTEST_WAY = 0.1
+"""Minimum distance to a place with a view for a vehicle at the edge of its lane [m]."""
 
 
 class Body(NamedTuple):
@@ -255,6 +257,9 @@ def with_view(
         change_length(value - edge, WALKING_PACE, acceleration),
     )
     starts = [begin - onward for onward in lengths]
+    if abs(edge - offset) <= AT_OFFSET:
+        # It is at the edge, and keeps its offset up to the place, instead of a place that is farther.
+        edge, length = offset, SHORTEST_WAY
     onward = next((start for start in starts if s + length <= start), None)
     if math.isfinite(profile.waits_at) or onward is None:
         return None
