@@ -251,7 +251,9 @@ class OncomingTraffic:
         first = int(outside.argmax())
         back, return_s = self._return(profile, motion, outside)
         passed = self._passed(profile, float(motion.s[0]), scene)
-        possible, duration = self._can_give_up(motion, scene, passed, np.maximum(side * offsets - border, 0.0))
+        # Where it may stand beyond the border it need not return.
+        excess = np.maximum(side * offsets - border - OVERRUN, 0.0)
+        possible, duration = self._can_give_up(motion, scene, passed, excess)
         # Behind what moves there is no place to wait.
         moves = bool((scene.speed[passed, 0] > ONCOMING_SPEED).any())
         if first and not moves:

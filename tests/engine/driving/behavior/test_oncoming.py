@@ -263,6 +263,19 @@ def test_vehicle_before_its_place_of_waiting_may_cross_the_border_slightly(
     assert traffic(150.0).verify(profile, motion, outlook, is_current=True) is expected
 
 
+@pytest.mark.parametrize(("beyond", "expected"), [(0.1, Verdict.GIVE_UP), (0.4, Verdict.GO)])
+def test_vehicle_slightly_beyond_the_border_needs_no_return(beyond: float, expected: Verdict) -> None:
+    """At 2 m/s its front is 2 m behind a car: it stops 1 m behind that, and returns by 0.1 m within 11 √(0.1 / 3.5) m,
+    1.9 m. Its view of 60 m does not suffice to pass."""
+    s = 37.5 - 2.0 - BODY.front
+    places, values = (s + BODY.wheelbase, 40.0, 60.0, 80.0), (0.75 + beyond, 3.0, 3.0, 0.0)
+    profile = LateralProfile("pass", places, values, side=1, border=0.75)
+    speed = np.minimum(2.0 + 2.0 * TIMES, 10.0)
+    motion = Motion(s + np.append(0.0, np.cumsum((speed[1:] + speed[:-1]) / 8.0)), speed)
+    outlook = Outlook(LINE, scene((40.0, 0.0, 0.0)), BESIDE, 0.0)
+    assert traffic(60.0).verify(profile, motion, outlook, is_current=True, has_begun=True) is expected
+
+
 @pytest.mark.parametrize("is_last_place", [True, False])
 def test_vehicle_without_any_view_begins_after_two_long_pauses(is_last_place: bool) -> None:
     """A truck 2.4 m ahead hides the lane near it; traffic at 10 m/s needs 10 + 100 / 12 m to stop."""
