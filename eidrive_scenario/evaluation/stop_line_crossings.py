@@ -13,7 +13,7 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import segment_distance
 from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.perception.traffic_lights import ON_PATH, SAME_WAY, StopLine, places_along, stop_lines
-from eidrive_scenario.roads import OTHER_LEVEL, LaneKey, RoadNetwork
+from eidrive_scenario.roads import OTHER_LEVEL, RoadNetwork
 from eidrive_scenario.sensing.signals import Kind
 
 NEAR = 30.0
@@ -42,9 +42,9 @@ class _Pending(NamedTuple):
 class StopLineCrossings:
     """Crossings of the stop lines of one kind of signal, in the direction of their traffic.
 
-    A line at the entry of a junction that is valid for one connecting road only counts once the point reaches the
-    middle of that road, with the time at which it crossed the line. It does not count if the point leaves the junction
-    backwards over the line.
+    A line at the entry of a junction that is valid for one connecting road only counts once the point reaches the end
+    of its way along that road, with the time at which it crossed the line. It does not count if the point leaves the
+    junction backwards over the line.
     """
 
     def __init__(self, roads: RoadNetwork, kind: Kind) -> None:
@@ -61,7 +61,7 @@ class StopLineCrossings:
         self._on_route = [
             line
             for _, line in places_along(self.lines, route[:, :2], route[:, 2])
-            # A route that ends before the middle of the connecting road does not determine this road
+            # A route that ends before the end of the way does not determine this road
             if line.beyond is not None
             and min(segment_distance(*line.beyond, *begin, *end) for begin, end in segments) <= ON_PATH
         ]
@@ -104,7 +104,8 @@ class StopLineCrossings:
         The undecided crossings of all these roads are then decided.
         """
         newest = [pending for pending in self._pending if pending.time == time]
-        entries = {entry for pending in newest for entry in _alternatives(self._roads, pending.line)}
+        lanes = [pending.line.entry for pending in newest if pending.line.entry is not None]
+        entries = {entry for lane in lanes for entry in self._roads.alternatives(lane)}
         if not entries:
             return None
         possible = entries & {line.entry for line in self._on_route} or entries
@@ -135,19 +136,6 @@ class StopLineCrossings:
         ]
         self._pending = [pending for pending in kept if pending.line.signal not in decided]
         return crossings
-
-
-def _alternatives(roads: RoadNetwork, line: StopLine) -> set[LaneKey]:
-    """Return the lanes of connecting roads that continue the lane of a stop line; empty if the map links none."""
-    assert line.entry is not None
-    against = -roads.driving_direction(line.entry.road, line.entry.lane)
-    return {
-        lane
-        for incoming, backwards in roads.links.beyond(line.entry, against)
-        for lane, onwards in roads.links.beyond(incoming, -backwards)
-        if onwards == roads.driving_direction(lane.road, lane.lane)
-        and roads.roads[lane.road].sections[lane.section].lanes[lane.lane].drivable
-    }
 
 
 def crosses(line: StopLine, before: Point, now: Point, heading: float) -> bool:

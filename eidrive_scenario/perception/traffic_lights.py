@@ -21,8 +21,10 @@ ON_PATH = 1.75
 """Maximum distance between a path and the lane center at the stop line of the lane [m]."""
 AS_NEAR = 0.5
 """Maximum difference of the distances of the end of a path from two connecting roads that may be on any of them [m]."""
-WAY_POINTS = 4
-"""Number of points of the way from the start of a connecting road to its middle."""
+APART = 2.0 * ON_PATH
+"""Distance from other connecting roads at which a place is only on one of them [m]."""
+WAY_POINTS, SAMPLES = 4, 20
+"""Numbers of points of the way along a connecting road, and at which its distances from others are measured."""
 NEAR_SIDE = 10.0
 """Maximum distance of a light from the entry of its junction, along and across, at which it stands before it [m]."""
 SAME_WAY = math.cos(math.radians(45.0))
@@ -32,8 +34,9 @@ class StopLine(NamedTuple):
     """Position at which a signal stops the traffic of one lane.
 
     x, y, z   on the center of the lane [m];  heading  of its traffic [rad]
-    way       points from the start of a connecting road to its middle, which only the routes with this signal pass,
-              unless they end before it; empty if the line alone determines them
+    way       points from the start of a connecting road to its middle, or to the place farther on that is apart from
+              other roads from the same lane: only the routes with this signal pass it, unless they end before it; empty
+              if the line alone determines them
     entry     lane at the start of this connecting road; None without one
     """
 
@@ -132,12 +135,14 @@ def _lines(roads: RoadNetwork, signal: Signal, kind: Kind, place: SignalPlace) -
             pose = roads.lane_pose_at(road.id, number, place.s)
         else:
             section = road.section_at(place.s)
-            begin, middle = section.s if direction > 0 else section.end, (section.s + section.end) / 2.0
-            along = roads.lane_pose(road.id, number, np.linspace(begin, middle, WAY_POINTS + 1)[1:])
-            way = tuple(zip(along.x.tolist(), along.y.tolist(), strict=True))
-            entry = roads.entry_lane(LaneKey(road.id, section.index, number))
+            lane = LaneKey(road.id, section.index, number)
+            entry = roads.entry_lane(lane)
             if entry is None:
                 continue
+            begin = section.s if direction > 0 else section.end
+            end = _end_of_way(roads, lane, [other for other in roads.alternatives(entry) if other.road != road.id])
+            along = roads.lane_pose(road.id, number, np.linspace(begin, end, WAY_POINTS + 1)[1:])
+            way = tuple(zip(along.x.tolist(), along.y.tolist(), strict=True))
             pose = roads.lane_pose_at(road.id, entry.lane, 0.0 if direction > 0 else road.length)
         heading = pose.h + (0.0 if direction > 0 else math.pi)
         back = 0.0
@@ -149,6 +154,24 @@ def _lines(roads: RoadNetwork, signal: Signal, kind: Kind, place: SignalPlace) -
             back = before if 0.0 < before < NEAR_SIDE and aside < NEAR_SIDE else 0.0
         x, y = pose.x - back * math.cos(heading), pose.y - back * math.sin(heading)
         yield StopLine(signal.id, kind, x, y, pose.z, heading, way, entry)
+
+
+def _end_of_way(roads: RoadNetwork, lane: LaneKey, others: Sequence[LaneKey]) -> float:
+    """Return the first place in the second half of a lane of a connecting road that is apart from others, or the one
+    farthest from them [m along the road]."""
+    section = roads.roads[lane.road].sections[lane.section]
+    ahead = roads.driving_direction(lane.road, lane.lane) > 0
+    places = np.linspace((section.s + section.end) / 2.0, section.end if ahead else section.s, SAMPLES)
+    apart = np.full(SAMPLES, math.inf)
+    for other in others:
+        beside = roads.roads[other.road].sections[other.section]
+        own, its = (
+            roads.lane_pose(key.road, key.lane, s)
+            for key, s in ((lane, places), (other, np.linspace(beside.s, beside.end, 2 * SAMPLES)))
+        )
+        apart = np.minimum(apart, np.hypot(own.x[:, None] - its.x, own.y[:, None] - its.y).min(axis=1))
+    is_apart = apart >= APART
+    return float(places[is_apart.argmax() if is_apart.any() else apart.argmax()])
 
 
 def places_along(

@@ -224,6 +224,18 @@ class RoadNetwork:
             number = min(drivable, key=lambda other: abs(other - lane.lane), default=None)
         return None if number is None else LaneKey(lane.road, first.index, number)
 
+    def alternatives(self, lane: LaneKey) -> frozenset[LaneKey]:
+        """Return the drivable lanes at the start of connecting roads that continue the same lane as one of them, which
+        is among them; empty if the map links none."""
+        against = -self.driving_direction(lane.road, lane.lane)
+        return frozenset(
+            alternative
+            for incoming, backwards in self.links.beyond(lane, against)
+            for alternative, onwards in self.links.beyond(incoming, -backwards)
+            if onwards == self.driving_direction(alternative.road, alternative.lane)
+            and self.roads[alternative.road].sections[alternative.section].lanes[alternative.lane].drivable
+        )
+
     def signal_lanes(self, place: SignalPlace) -> tuple[int, ...]:
         """Return the drivable lanes for which a signal at this place is valid, from left to right.
 

@@ -72,10 +72,10 @@ def test_stop_lines_exclude_other_signs() -> None:
     assert [(line.signal, line.kind) for line in stop_lines(roads)] == [("stop", "stop sign")]
 
 
-def test_stop_lines_of_connecting_roads_apply_before_junction() -> None:
-    """Straight on and left begin at the same point, each with a separate light."""
+def fork(curvature: float, length: float) -> RoadNetwork:
+    """Return roads straight on and to the left from the same point at x = 50 m, each with a separate light."""
     one = lanes_xml(0, 1)
-    roads = RoadNetwork.parse(
+    return RoadNetwork.parse(
         map_xml(
             road_xml("1", length=50.0, link=successor_xml(junction="9")),
             road_xml(
@@ -89,9 +89,9 @@ def test_stop_lines_of_connecting_roads_apply_before_junction() -> None:
             ),
             road_xml(
                 "3",
-                length=5 * math.pi,
+                length=length,
                 x=50.0,
-                curvature=0.1,
+                curvature=curvature,
                 link=predecessor_xml("1"),
                 lanes=one,
                 extra=f"<signals>{light('left', 8.0)}</signals>",
@@ -101,6 +101,10 @@ def test_stop_lines_of_connecting_roads_apply_before_junction() -> None:
             rest=junction_xml("9", "1", {"2": -1, "3": -1}),
         )
     )
+
+
+def test_stop_lines_of_connecting_roads_apply_before_junction() -> None:
+    roads = fork(0.1, 5.0 * math.pi)
     arc = np.linspace(0, math.pi / 2, 20)
     turn = np.column_stack([50 + 11.75 * np.sin(arc), 10 - 11.75 * np.cos(arc)])
     before = np.column_stack([np.arange(0.0, 50.0), np.full(50, -1.75)])
@@ -111,6 +115,17 @@ def test_stop_lines_of_connecting_roads_apply_before_junction() -> None:
     assert [name for name, _ in names(roads, np.concatenate([before, turn[:7]]))] == ["left"]
     assert names(roads, np.concatenate([before, on[:9]])) == [("straight", 50.0)]
     assert names(roads, before) == []
+
+
+def test_stop_lines_of_roads_that_part_late_apply_to_one() -> None:
+    """In the middle of the roads the paths are 1.3 m apart, at their ends 5 m."""
+    roads = fork(0.025, 20.0)
+    arc = np.linspace(0.0, 0.5, 20)
+    left = np.column_stack([50 + 41.75 * np.sin(arc), 40 - 41.75 * np.cos(arc)])
+    before = np.column_stack([np.arange(0.0, 50.0), np.full(50, -1.75)])
+    on = np.column_stack([np.arange(50.0, 110.0), np.full(60, -1.75)])
+    for light_of_way, path in (("straight", on), ("left", left)):
+        assert [name for name, _ in names(roads, np.concatenate([before, path]))] == [light_of_way]
 
 
 def test_signals_ahead_require_stop_only_after_sight() -> None:
