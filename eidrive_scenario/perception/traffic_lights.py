@@ -162,14 +162,12 @@ def _end_of_way(roads: RoadNetwork, lane: LaneKey, others: Sequence[LaneKey]) ->
     section = roads.roads[lane.road].sections[lane.section]
     ahead = roads.driving_direction(lane.road, lane.lane) > 0
     places = np.linspace((section.s + section.end) / 2.0, section.end if ahead else section.s, SAMPLES)
-    apart = np.full(SAMPLES, math.inf)
+    own, apart = roads.lane_pose(lane.road, lane.lane, places), np.full(SAMPLES, math.inf)
     for other in others:
         beside = roads.roads[other.road].sections[other.section]
-        own, its = (
-            roads.lane_pose(key.road, key.lane, s)
-            for key, s in ((lane, places), (other, np.linspace(beside.s, beside.end, 2 * SAMPLES)))
-        )
-        apart = np.minimum(apart, np.hypot(own.x[:, None] - its.x, own.y[:, None] - its.y).min(axis=1))
+        along = roads.lane_pose(other.road, other.lane, np.linspace(beside.s, beside.end, 2 * SAMPLES))
+        distances = np.hypot(own.x[:, None] - along.x, own.y[:, None] - along.y)
+        apart = np.minimum(apart, distances.min(axis=1))
     is_apart = apart >= APART
     return float(places[is_apart.argmax() if is_apart.any() else apart.argmax()])
 

@@ -240,11 +240,11 @@ def test_vehicle_waits_at_the_edge_of_its_lane_with_a_view() -> None:
 @pytest.mark.parametrize(("left", "offset"), [(5.0, 0.65), (0.9, 0.65), (0.2, 0.6), (0.2, 0.7)])
 def test_vehicle_at_the_edge_keeps_its_place_until_it_is_there(left: float, offset: float) -> None:
     """The motion from the edge at walking pace, 2 m/s, would begin later than that at 10 m/s."""
-    place = with_view(PASSING, Start(-60.0, 0.65, 0.0, 5.0), SETTINGS, BODY, 30.0, 10.0)
-    assert place is not None
-    near = with_view(PASSING, Start(place.waits_at - left, offset, 0.0, 1.0), SETTINGS, BODY, 30.0, 10.0)
+    far = with_view(PASSING, Start(-60.0, 0.65, 0.0, 5.0), SETTINGS, BODY, 30.0, 10.0)
+    assert far is not None
+    near = with_view(PASSING, Start(far.waits_at - left, offset, 0.0, 1.0), SETTINGS, BODY, 30.0, 10.0)
     assert near is not None
-    assert near.waits_at == place.waits_at
+    assert near.waits_at == far.waits_at
     assert near.offset_at(near.waits_at) == pytest.approx(offset)
 
 
