@@ -72,6 +72,8 @@ STOPPING_ERROR = 0.5
 SLOW, OVERRUN = 1.0, 0.3
 """Speed below which the vehicle stops at the border [m/s], and distance by which it may be beyond it then, and on its
 way along the border to a place of waiting [m]."""
+SLOPE_LENGTH = 0.1
+"""Length of the way over which the slope of a profile is determined [m]."""
 DELAY = 0.3
 """Time until the vehicle brakes [s]."""
 BEHIND = 1.0
@@ -128,7 +130,7 @@ class OncomingTraffic:
         self._held_up_since: float | None = None
         self._held_up_until = -math.inf
         self._free_to, self._free_at = -math.inf, 0.0
-        """Place up to which the oncoming lane was free of unseen traffic at a time [m, s]."""
+        """Place up to which the oncoming lane was free at a time [m, s]."""
 
     def observe(
         self,
@@ -251,15 +253,20 @@ class OncomingTraffic:
         first = int(outside.argmax())
         back, return_s = self._return(profile, motion, outside)
         passed = self._passed(profile, float(motion.s[0]), scene)
-        # Where it may stand beyond the border it need not return.
-        excess = np.maximum(side * offsets - border - OVERRUN, 0.0)
-        possible, duration = self._can_give_up(motion, scene, passed, excess)
         # Behind what moves there is no place to wait.
         moves = bool((scene.speed[passed, 0] > ONCOMING_SPEED).any())
+        beyond = side * offsets - border
+        stop = motion.speed**2 / (2.0 * BRAKING) + motion.speed * DELAY
+        if not moves:
+            # A vehicle on its way out comes farther out while it brakes.
+            fronts = motion.s + body.wheelbase
+            slopes = side * (profile.offset(fronts + SLOPE_LENGTH) - profile.offset(fronts)) / SLOPE_LENGTH
+            beyond = beyond + 0.5 * stop * np.maximum(slopes, 0.0)
+        # Where it may stand beyond the border it need not return.
+        possible, duration = self._can_give_up(motion, scene, passed, np.maximum(beyond - OVERRUN, 0.0))
         if first and not moves:
             # Behind a standing object there is seldom space to return: the vehicle stops before the border.
-            stop = motion.s + motion.speed**2 / (2.0 * BRAKING) + motion.speed * DELAY
-            possible &= stop <= float(motion.s[first])
+            possible &= motion.s + stop <= float(motion.s[first])
         last = int(possible.argmin()) - 1 if not possible.all() else len(times) - 1
         if last < 0 and first == 0:
             return Verdict.GO
@@ -268,7 +275,8 @@ class OncomingTraffic:
         held = Verdict.FOLLOW if moves else Verdict.WAIT
         refused = held if first or (is_at_border and waits and not moves) else Verdict.GIVE_UP
         end, until = return_s + body.front, back if is_current else back + RESERVE
-        if math.isinf(back) or self._meets(profile, motion, scene, first, until, end):
+        traffic = self._traffic(profile, motion, scene, first)
+        if math.isinf(back) or self._meets(scene, traffic, until, end):
             return refused
         if last < 0 and has_begun:
             return Verdict.GO  # The point of no return has passed, and nothing is in view.
@@ -278,24 +286,28 @@ class OncomingTraffic:
         viewpoints = motion.s + body.center
         beside_line = profile.offset(viewpoints)
         here = (float(viewpoints[0]), float(beside_line[0]))
-        free = self._free(outlook, here, until, end)
-        if self._suffices(free, here[0], until, end, outlook):
+        # Traffic out of view behind that in view does not come before it.
+        nearest: Array = scene.front[traffic].min(axis=0, initial=math.inf)
+        free = self._free(outlook, here, until, end, float(nearest[0]))
+        if free >= nearest[0] or self._suffices(free, here[0], until, end, outlook):
             return Verdict.GO
         step = max(last, 0)
         there = (float(viewpoints[step]), float(beside_line[step]))
         hidden = self.first_hidden(outlook, there, step)
-        if not self._suffices(hidden, there[0], until - float(times[step]), end, outlook):
+        if hidden < nearest[step] and not self._suffices(hidden, there[0], until - float(times[step]), end, outlook):
             return refused
         # Until then the vehicle may have to return to its lane for traffic that comes into view on its way out.
-        free_to, since, observer = free, 0.0, here[0]
+        free_to, before, observer = free, 0, here[0]
         for number in range(first, step + 1 if step > first else first):
             time, s = float(times[number]), float(viewpoints[number])
-            returned = time + float(duration[number]) - since
-            if not self._suffices(free_to, observer, returned, s + body.half_length, outlook):
+            elapsed = time - float(times[before])
+            returned = elapsed + float(duration[number])
+            is_free = free_to >= nearest[before]
+            if not is_free and not self._suffices(free_to, observer, returned, s + body.half_length, outlook):
                 return refused
             hidden = self.first_hidden(outlook, (s, float(beside_line[number])), number)
-            free_to = max(hidden, free_to - self.hidden_speed(outlook.beside, outlook.now) * (time - since))
-            since, observer = time, s
+            free_to = max(hidden, free_to - self.hidden_speed(outlook.beside, outlook.now) * elapsed)
+            before, observer = number, s
         return Verdict.GO
 
     def yields(self, outlook: Outlook, viewpoint: tuple[float, float], *, is_last_place: bool, has_view: bool) -> bool:
@@ -341,18 +353,21 @@ class OncomingTraffic:
         """Return whether nothing but the range of the sensors limits the view from `viewpoint`."""
         return hidden >= viewpoint + float(self._ahead[-1]) - SAMPLE
 
-    def _free(self, outlook: Outlook, viewpoint: tuple[float, float], duration: float, end: float) -> float:
-        """Return the place up to which the oncoming lane is free of unseen traffic [m].
+    def _free(
+        self, outlook: Outlook, viewpoint: tuple[float, float], duration: float, end: float, nearest: float
+    ) -> float:
+        """Return the place up to which the oncoming lane is free, at most that of the `nearest` traffic in view [m].
 
-        What was in view stays free until traffic can have come there. Where none is expected from beyond the range of
-        the sensors, none is expected until some comes into view.
+        What was in view stays free until traffic can have come there: the traffic in view, too, which an obstacle may
+        hide soon. Where none is expected from beyond the range of the sensors, none is expected until some comes into
+        view.
         """
         now = outlook.now
         still_free = self._free_to - self.hidden_speed(outlook.beside, now) * (now - self._free_at)
         hidden = self.first_hidden(outlook, viewpoint)
         if self._is_over(hidden, viewpoint[0], duration, end, now) and hidden >= end:
             hidden = math.inf
-        self._free_to, self._free_at = max(still_free, hidden), now
+        self._free_to, self._free_at = min(max(still_free, hidden), nearest), now
         return self._free_to
 
     def place_with_view(self, profile: LateralProfile, scene: Surroundings, oncoming: float, s: float) -> float:
@@ -438,19 +453,19 @@ class OncomingTraffic:
         braking = closing**2 / (2.0 * BRAKING)
         return np.asarray(gap >= np.maximum(returning, braking) + BEHIND), duration
 
-    def _meets(
-        self, profile: LateralProfile, motion: Motion, scene: Surroundings, first: int, until: float, end: float
-    ) -> bool:
-        """Return whether oncoming traffic in view is before `end` [m] at the time `until` [s], and was ahead of the
-        vehicle at the step `first`: then it meets it."""
+    def _traffic(self, profile: LateralProfile, motion: Motion, scene: Surroundings, first: int) -> Bools:
+        """Return which hypotheses (N,) are oncoming traffic in view, ahead of the vehicle at the step `first`."""
         aside = np.abs(profile.side * max(abs(value) for value in profile.values) - scene.d)
         beside = aside - scene.half_width < self._body.half_width + scene.margin[:, None] * 0.5
         comes = np.logical_or.reduce(beside & (scene.speed < -ONCOMING_SPEED), axis=1)
-        comes &= scene.front[:, first] > float(motion.s[first]) - self._body.rear
+        return np.asarray(comes & (scene.front[:, first] > float(motion.s[first]) - self._body.rear))
+
+    def _meets(self, scene: Surroundings, traffic: Bools, until: float, end: float) -> bool:
+        """Return whether traffic (N,) is before `end` [m] at the time `until` [s]: then the vehicle meets it."""
         # Beyond the horizon all keep their last speeds.
         step = min(int(np.searchsorted(self._times, until)), len(self._times) - 1)
         rear = scene.rear[:, step] + scene.speed[:, step] * max(until - float(self._times[-1]), 0.0)
-        return bool((comes & (rear < end)).any())
+        return bool((traffic & (rear < end)).any())
 
 
 def approach(speed: float, duration: float, deceleration: float = RESPONSE_DECELERATION) -> float:

@@ -242,14 +242,14 @@ class BehaviorPlanner(RoutePlanner):
     ) -> Decision:
         x, y, _ = ego.position.tolist()
         s, d = position
-        known_objects = self._memory.update(objects, now, self._in_view(ego))
+        known_objects = self._memory.update(objects, now, self._in_view(ego, objects))
         lanes = self._predictor.lanes(known_objects)
         self._predictor.follow_lanes(known_objects, lanes)
         way = max(ego.speed, wanted) * self.planner_settings.horizon
         indexes = [
             index
             for index, known_object in enumerate(known_objects)
-            if math.hypot(known_object.x - x, known_object.y - y) < MARGIN_AHEAD + 2.0 * way
+            if math.hypot(known_object.x - x, known_object.y - y) < max(MARGIN_AHEAD + 2.0 * way, self._ranges[0])
         ]
         near = [known_objects[index] for index in indexes]
         stop = self._stop(line.path, ego, x, y, now)
@@ -257,7 +257,7 @@ class BehaviorPlanner(RoutePlanner):
         gives_way, defers = self._precedence(passages)
         limits, hidden = self._caution(ego, objects, line, s, wanted, now)
         low = line.index_at(s - MARGIN_AHEAD)
-        high = line.index_at(s + way + MARGIN_AHEAD) + 1
+        high = line.index_at(s + max(way + MARGIN_AHEAD, self._ranges[0])) + 1
         situation = Situation(
             settings=self.planner_settings,
             body=self._body,
@@ -293,19 +293,27 @@ class BehaviorPlanner(RoutePlanner):
             lambda other: other.junction in ahead and rules.gives_way(other, ahead[other.junction]),
         )
 
-    def _in_view(self, ego: EgoState) -> Callable[[Sequence[KnownObject]], Bools] | None:
-        """Return a function that determines which objects are in view of the sensors; None: all of them."""
-        sectors = self.view
-        if sectors is None or all(sector.half_angle >= math.pi for sector in sectors):
-            return None
+    def _in_view(self, ego: EgoState, objects: Detections) -> Callable[[Sequence[KnownObject]], Bools] | None:
+        """Return a function that determines which objects are in view of the sensors; None: all of them.
 
-        def in_view(objects: Sequence[KnownObject]) -> Bools:
-            positions = np.array([(known_object.x, known_object.y) for known_object in objects]) - ego.position[:2]
-            radius = np.array([known_object.width / 2.0 for known_object in objects])
-            cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
-            x, y = cos * positions[:, 0] + sin * positions[:, 1], cos * positions[:, 1] - sin * positions[:, 0]
-            shown = [sector.contains(x, y, radius) for sector in sectors]
-            return np.asarray(np.logical_or.reduce(shown))
+        objects  in view, which hide what is behind them
+        """
+        if self.view is None:
+            return None
+        x, y, z = ego.position.tolist()
+        eyes = [sector.placed(x, y, z, ego.yaw) for sector in self.view]
+
+        def in_view(lost: Sequence[KnownObject]) -> Bools:
+            points = np.array([(known_object.x, known_object.y) for known_object in lost])
+            radius = np.array([known_object.width / 2.0 for known_object in lost])
+            occluders = Occluders.of_boxes(objects.boxes)
+            shown = np.zeros(len(lost), dtype=bool)
+            for eye in eyes:
+                inside = ~occluders.block(eye, points, z)
+                if eye.half_angle < math.pi:
+                    inside &= eye.contains(points[:, 0], points[:, 1], radius)
+                shown |= inside
+            return shown
 
         return in_view
 

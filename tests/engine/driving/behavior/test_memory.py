@@ -7,9 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from planned_drive import KnownBox, detections
+from planned_drive import KnownBox, PlannedDrive, behavior, detections, two_lane_road
 
 from eidrive_scenario.base.arrays import Bools
+from eidrive_scenario.base.coverage import ViewSector
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.planning.behavior.memory import KnownObject, ObjectMemory
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
@@ -76,6 +77,25 @@ def test_lost_object_is_kept_while_its_place_is_out_of_view() -> None:
     assert objects.update(Detections(6.0), 6.0, shown)
     assert objects.update(Detections(6.8), 6.8, shown)
     assert not objects.update(Detections(7.1), 7.1, shown)
+
+
+@pytest.mark.parametrize("has_van", [True, False])
+def test_pedestrian_behind_a_parked_van_is_remembered(*, has_van: bool) -> None:
+    """At 1.5 s the line of sight from x = 35 m to the pedestrian at (80, -6.75) passes x = 70 m at y = -5.6 m, inside
+    the van; at 3.2 s that from 52 m to (80, -4.2) passes 74 m at y = -3.7 m."""
+    van = KnownBox(70.0, -4.6, kind="van", size=(8.0, 2.2))
+    roads = two_lane_road()
+    planner = behavior(roads)
+    planner.view = (ViewSector(1.4, 0.0, 1.6, 0.0, math.pi, 100.0),)
+    run = PlannedDrive(planner, roads)
+
+    def objects(now: float) -> list[KnownBox]:
+        walker = KnownBox(80.0, -9.0 + 1.5 * now, vy=1.5, kind="pedestrian", size=(0.5, 0.5))
+        return [van] * has_van + [walker] * (now < 1.5)
+
+    run.run(3.2, objects)
+    run.world.close()
+    assert ("pedestrian" in run.reasons[-1]) == has_van
 
 
 def test_object_out_of_view_is_forgotten_after_some_time() -> None:

@@ -174,6 +174,19 @@ def test_view_has_to_suffice_for_the_maneuver(view: float, now: float, expected:
     assert verdict(view=view, now=now) is expected
 
 
+@pytest.mark.parametrize(
+    ("start", "speed", "expected"),
+    [
+        (95.0, -1.5, Verdict.GO),
+        (95.0, -3.0, Verdict.WAIT),  # it is itself at 59.5 m after 11 s
+        (125.0, -1.5, Verdict.WAIT),  # up to 116 m, the end of the view from -13.6 m, faster traffic may be before it
+    ],
+)
+def test_traffic_out_of_view_does_not_come_before_that_in_view(start: float, speed: float, expected: Verdict) -> None:
+    """The view of 130 m itself does not suffice. After 11 s the rear of the first car is at 76 m, beyond 68.8 m."""
+    assert verdict((40.0, 0.0, 0.0), (start, 3.5, speed), view=130.0) is expected
+
+
 @pytest.mark.parametrize(("quiet", "expected"), [(120.0, Verdict.WAIT), (160.0, Verdict.GO)])
 def test_traffic_is_over_if_the_next_vehicle_is_improbable(quiet: float, expected: Verdict) -> None:
     """From -13.6 m on, for 11 - 1.5 s, traffic at 8 m/s comes from 130 m farther to 68.8 m in 6 s: it can be unseen for
@@ -271,6 +284,21 @@ def test_vehicle_slightly_beyond_the_border_needs_no_return(beyond: float, expec
     places, values = (s + BODY.wheelbase, 40.0, 60.0, 80.0), (0.75 + beyond, 3.0, 3.0, 0.0)
     profile = LateralProfile("pass", places, values, side=1, border=0.75)
     speed = np.minimum(2.0 + 2.0 * TIMES, 10.0)
+    motion = Motion(s + np.append(0.0, np.cumsum((speed[1:] + speed[:-1]) / 8.0)), speed)
+    outlook = Outlook(LINE, scene((40.0, 0.0, 0.0)), BESIDE, 0.0)
+    assert traffic(60.0).verify(profile, motion, outlook, is_current=True, has_begun=True) is expected
+
+
+@pytest.mark.parametrize(("slope", "expected"), [(0.05, Verdict.GIVE_UP), (0.35, Verdict.GO)])
+def test_vehicle_on_its_way_out_comes_farther_while_it_brakes(slope: float, expected: Verdict) -> None:
+    """At 3 m/s it stops after 3² / 6 + 0.3 · 3 = 2.4 m, on which its offset grows by half of the slope: from 0.1 m
+    beyond the border to 0.16 m or 0.52 m. From there it returns by 0.22 m within 11 √(0.22 / 3.5) = 2.8 m, more than
+    the 2 m to 1 m behind a car. Its view of 60 m does not suffice to pass."""
+    s = 37.5 - 3.0 - BODY.front
+    front = s + BODY.wheelbase
+    places, values = (front, front + 4.0, 60.0, 80.0), (0.85, 3.0, 3.0, 0.0)
+    profile = LateralProfile("pass", places, values, slope, side=1, border=0.75)
+    speed = np.minimum(3.0 + 2.0 * TIMES, 10.0)
     motion = Motion(s + np.append(0.0, np.cumsum((speed[1:] + speed[:-1]) / 8.0)), speed)
     outlook = Outlook(LINE, scene((40.0, 0.0, 0.0)), BESIDE, 0.0)
     assert traffic(60.0).verify(profile, motion, outlook, is_current=True, has_begun=True) is expected
