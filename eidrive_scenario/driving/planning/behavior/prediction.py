@@ -227,13 +227,16 @@ class Predictor:
                 break
         known_object.followed = followed
         # It is expected to turn before the ego only if it leaves its lane, in the direction of the turn.
+        # It may do so if it slows down.
         usual = min((turn for _, turn, _ in deviations), default=0.0) + SIMILAR_TURN
         least = min((deviation for deviation, turn, _ in deviations if turn <= usual), default=math.inf)
         likely = min((coming for *_, coming in deviations), default=0.0) + SIMILAR_TURN
+        slows = known_object.acceleration <= -NOTICEABLE
+        expected = [turn <= usual or least > max(steady, deviation) for deviation, turn, _ in deviations]
         following = [
-            hypothesis._replace(likely=coming <= likely)
-            for hypothesis, (deviation, turn, coming) in zip(following, deviations, strict=True)
-            if turn <= usual or least > max(steady, deviation)
+            hypothesis._replace(likely=is_expected and coming <= likely)
+            for hypothesis, is_expected, (*_, coming) in zip(following, expected, deviations, strict=True)
+            if is_expected or slows
         ]
         return following or too_fast or leaving[:MOST_HYPOTHESES] or [_straight_on(known_object, travelled, speed)]
 

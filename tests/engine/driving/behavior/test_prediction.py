@@ -243,6 +243,19 @@ def test_turn_that_gives_way_is_predicted_once_it_shows(turned: float, expected:
     assert (np.abs(prediction.y[:, -1] - 3.5) < 0.5).any()
 
 
+@pytest.mark.parametrize(("acceleration", "may_turn"), [(-0.5, False), (-1.0, True)])
+def test_vehicle_that_slows_down_may_turn_without_giving_way(acceleration: float, *, may_turn: bool) -> None:
+    """From 0.8 m/s² on a deceleration is noticeable. The turn is then no reason for emergency braking."""
+    roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
+    (entry,) = known(KnownBox(53.0, 3.5, -6.0, yaw=math.pi))
+    entry.acceleration = acceleration
+    prediction = Predictor(roads, TIMES).predict([entry], defers=lambda passage: passage.turn > 1.0)
+    to_left = np.sin(prediction.yaw[:, -1] - prediction.yaw[:, 0]) > 0.5
+    assert to_left.any() == may_turn
+    assert not np.array(prediction.likely)[to_left].any()
+    assert any(prediction.likely)
+
+
 @pytest.mark.parametrize(("defers", "turns"), [(False, {-1, 0, 1}), (True, {0})])
 def test_only_vehicle_with_the_right_of_way_may_turn_before_a_junction(defers: bool, turns: set[int]) -> None:
     """It comes from the south, 20 m before the junction; turns in units of 90 degrees."""
