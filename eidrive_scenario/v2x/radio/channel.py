@@ -82,6 +82,8 @@ class RadioChannel(QueuedChannel):
         self._until: float | None = None
         """Time up to which the medium is simulated [s]."""
         self._entry_times: dict[str, float] = {}
+        self._last_ready: dict[str, float] = {}
+        """Time at which the last message of each station is ready, without reordering [s]."""
         self._last_arrival: dict[tuple[str, str], float] = {}
 
     def update_environment(self, surroundings: RadioEnvironment) -> None:
@@ -112,6 +114,8 @@ class RadioChannel(QueuedChannel):
             number = reports.get(message.sender, message.number) if message.kind == "features" else message.number
             reports[message.sender] = number
             ready = now + message.offset + self.profile.jitter * uniform(self._jitter_keys[row], number)
+            if not self.profile.reordering:
+                ready = self._last_ready[message.sender] = max(ready, self._last_ready.get(message.sender, ready))
             transmission = Transmission(message, receivers, now, ready, self.profile.airtime(message.size))
             self._counters.send(row, rows, message.size)
             if message.sender in self._jammed:
@@ -266,7 +270,7 @@ class RadioChannel(QueuedChannel):
         indices = block.indices[delivered]
         for index, row in zip(indices.tolist(), block.reached_receivers[delivered].tolist(), strict=True):
             receivers[index].append(names[row])
-        if isinstance(delay, ConstantDelay):
+        if isinstance(delay, ConstantDelay) and self.profile.reordering:
             ends = np.array([transmission.end + delay.seconds for transmission in block.ended])
             block.arrives[delivered] = ends[indices]
             for transmission, arrives, reached in zip(block.ended, ends.tolist(), receivers, strict=True):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -81,6 +82,31 @@ def test_radio_channel_without_reordering_delays_messages_behind_earlier_ones() 
     assert arrivals[True] != sorted(arrivals[True])
     assert arrivals[False] == sorted(arrivals[False])
     assert all(late >= early for late, early in zip(arrivals[False], arrivals[True], strict=True))
+
+
+@pytest.mark.parametrize("technology", ["80211p", "cv2x_mode4", "nr_v2x_mode2"])
+@pytest.mark.parametrize(
+    "delay", [{"kind": "constant"}, {"kind": "uniform", "minimum": 0.0, "maximum": 0.02}], ids=["constant", "uniform"]
+)
+def test_radio_channel_without_reordering_delivers_kinds_by_message_number(
+    technology: str, delay: dict[str, object]
+) -> None:
+    """A CAM and a CPM of each tick are ready in random order."""
+
+    def numbers(reordering: bool) -> list[int]:
+        carrier = radio(1, technology=technology, reordering=reordering, jitter=0.04, delay=delay, **QUIET)
+        received = []
+        for tick in range(100):
+            now = DT * tick
+            carrier.update_environment(RadioEnvironment({"A": (0.0, 0.0, 1.5), "B": (30.0, 0.0, 1.5)}))
+            received += [delivery.message.number for delivery in carrier.deliver("B", now)]
+            cam = msgspec.structs.replace(message("A", 2 * tick, now), kind="cam")
+            carrier.transmit([(cam, ["B"]), (message("A", 2 * tick + 1, now, 190), ["B"])], now)
+        return received
+
+    assert numbers(True) != sorted(numbers(True))
+    assert numbers(False) == sorted(numbers(False))
+    assert len(numbers(False)) > 40
 
 
 def test_channel_busy_ratio_of_a_late_station_covers_its_own_time() -> None:
