@@ -81,6 +81,8 @@ class QueuedChannel(Channel):
         self._links = Links()
         self.surroundings = EMPTY_RADIO_ENVIRONMENT
         """Current antenna positions."""
+        self._last_arrival: dict[tuple[str, str], float] = {}
+        """Arrival of the last message on each link [s], for models that keep the order of messages."""
 
         self._remaining: list[LinkEvent] = []
 
@@ -107,6 +109,7 @@ class QueuedChannel(Channel):
             raise SettingError(Diagnostic(message, "derive both channels from LinkChannel"))
         previous.finalize()
         self._links = previous._links
+        self._last_arrival = self._links.last_arrivals()
         self.surroundings = previous.surroundings
         self._remaining = list(previous.drain_events())
 

@@ -43,7 +43,6 @@ class ComposedChannel(LinkChannel):
         self.own_perception = profile.own_perception
         self._losses = LossProcess(profile.loss, seed)
         self._draws = LinkRandom(seed)
-        self._last_arrival: dict[tuple[str, str], float] = {}
 
     def transmission_outcome(self, message: Message, receiver: str, now: float) -> float | str:
         distance = self.surroundings.distance(message.sender, receiver)

@@ -84,7 +84,6 @@ class RadioChannel(QueuedChannel):
         self._entry_times: dict[str, float] = {}
         self._last_ready: dict[str, float] = {}
         """Time at which the last message of each station is ready, without reordering [s]."""
-        self._last_arrival: dict[tuple[str, str], float] = {}
 
     def update_environment(self, surroundings: RadioEnvironment) -> None:
         super().update_environment(surroundings)
@@ -154,7 +153,6 @@ class RadioChannel(QueuedChannel):
             self._set_stations(previous._access.names, self._until)
             self._link_budget.continue_from(previous._link_budget)
             self._access.continue_from(previous._access)
-            self._last_arrival = previous._last_arrival
 
     def finalize(self) -> None:
         if self._until is not None:  # before the first tick there is nothing to determine

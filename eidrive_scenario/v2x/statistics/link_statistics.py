@@ -206,6 +206,14 @@ class Links:
         self._reception_log.record(receiver, due)
         return tuple([entry[4] for entry in due])
 
+    def last_arrivals(self) -> dict[tuple[str, str], float]:
+        """Return the time of arrival of the last message in flight on each link [s], by (sender, receiver)."""
+        arrivals: dict[tuple[str, str], float] = {}
+        for receiver, queue in self._queues.items():
+            for arrives, sender, *_ in queue:
+                arrivals[sender, receiver] = max(arrives, arrivals.get((sender, receiver), arrives))
+        return arrivals
+
     def remove(self, receiver: str) -> None:
         """End the links to a station that has left: messages in flight to it are lost, and their age is not counted."""
         for _, sender, *_ in self._queues.pop(receiver, ()):

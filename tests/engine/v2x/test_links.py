@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from radio_traffic import composed, message
+from radio_traffic import composed, message, radio
 
-from eidrive_scenario.v2x.channel import Channel
+from eidrive_scenario.v2x.channel import Channel, QueuedChannel
 from eidrive_scenario.v2x.messages.message import LinkEvent, ReceivedMessage
 from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 from eidrive_scenario.v2x.statistics.link_statistics import Links
@@ -168,6 +170,30 @@ def test_continue_from_keeps_messages_in_flight() -> None:
     assert events[0].outcome == "lost"
     assert [entry.message.number for entry in jammed.deliver("Ego", 0.3)] == [0]
     assert jammed.statistics(0.3)["RSU", "Ego"].in_flight == 0
+
+
+@pytest.mark.parametrize("reordering", [True, False])
+@pytest.mark.parametrize("models", [(composed, composed), (composed, radio), (radio, composed), (radio, radio)])
+def test_channel_without_reordering_waits_for_messages_of_the_replaced_channel(
+    models: tuple[Callable[..., QueuedChannel], ...], reordering: bool
+) -> None:
+    """Message 0 arrives after 1 s and messages 1 and 2, of the next two channels, not before it."""
+    places = RadioEnvironment({"RSU": (0.0, 0.0, 5.0), "Ego": (9.0, 0.0, 1.5)})
+    arrivals: list[float | None] = []
+    previous: QueuedChannel | None = None
+    for number, model in enumerate((models[0], models[1], models[0])):
+        carrier = model(delay={"kind": "constant", "seconds": 0.0 if number else 1.0}, reordering=reordering)
+        if previous is not None:
+            carrier.continue_from(previous)
+        carrier.update_environment(places)
+        now = 0.1 * number
+        events = carrier.transmit([(message("RSU", number, now), ["Ego"])], now)
+        previous = carrier
+        carrier.finalize()
+        arrivals += [event.arrives for event in [*events, *carrier.drain_events()]]
+    assert arrivals[0] == pytest.approx(1.0, abs=0.02)
+    expected = arrivals[:1] * 2 if not reordering else pytest.approx([0.1, 0.2], abs=0.02)
+    assert arrivals[1:] == expected
 
 
 def test_links_count_bytes_sent_per_link() -> None:
