@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -117,8 +118,8 @@ class DroppedBlock(OutcomeBlock):
         return OutcomeColumns(self._names, sender, self._receivers, OUTCOMES, cause, number, sent, arrives, size)
 
 
-_CLASSES = 41
-"""Number of distance classes; the last class contains all distances beyond 1 km."""
+_CLASSES = 40
+"""Number of distance classes that are counted in an array, up to 1 km; few links are longer."""
 
 
 class LinkCounterTable:
@@ -132,6 +133,8 @@ class LinkCounterTable:
         # links in the last axes: most entries of the others remain zero, and their memory is not touched
         self._causes = np.zeros((len(CAUSES), count, count), dtype=np.int64)
         self._outcomes = np.zeros((2, _CLASSES, count, count), dtype=np.int64)
+        self._far_outcomes: Counter[tuple[int, int, int, bool]] = Counter()
+        """Outcomes in other distance classes, by sender, receiver, class and whether the message is delivered."""
 
     def send(self, row: int, receivers: Integers, size: int) -> None:
         """Count a sent message of `size` bytes."""
@@ -147,8 +150,11 @@ class LinkCounterTable:
         links = len(self.names) ** 2
         link = senders * len(self.names) + receivers  # flat indices: np.add.at is ten times as fast
         np.add.at(self._causes.reshape(-1), causes.astype(np.int64) * links + link, 1)
-        distance_class = np.minimum((distance // DISTANCE_BIN).astype(np.int64), _CLASSES - 1)
-        np.add.at(self._outcomes.reshape(-1), ((causes == DELIVERED) * _CLASSES + distance_class) * links + link, 1)
+        distance_class, is_delivered = (distance // DISTANCE_BIN).astype(np.int64), causes == DELIVERED
+        near, outcome = distance_class < _CLASSES, (is_delivered * _CLASSES + distance_class) * links + link
+        np.add.at(self._outcomes.reshape(-1), outcome[near], 1)
+        far = (column[~near].tolist() for column in (senders, receivers, distance_class, is_delivered))
+        self._far_outcomes.update(zip(*far, strict=True))
 
     def flush_into(self, links: Links) -> None:
         """Add the counts to the counters of the links and reset them."""
@@ -172,5 +178,9 @@ class LinkCounterTable:
             *(column.tolist() for column in (*counted, outcomes[counted])), strict=True
         ):
             counters[link].count_outcomes(distance_class, losses + deliveries, deliveries)
+        for (sender, receiver, distance_class, is_delivered), number in self._far_outcomes.items():
+            counter = links.counters(self.names[sender], self.names[receiver])
+            counter.count_outcomes(distance_class, number, is_delivered * number)
+        self._far_outcomes.clear()
         for counts in (self._sent, self._bytes, self._causes, self._outcomes):
             counts[..., senders, receivers] = 0  # not all links: these are many, and few of them changed

@@ -109,6 +109,18 @@ def test_radio_channel_without_reordering_delivers_kinds_by_message_number(
     assert len(numbers(False)) > 40
 
 
+@pytest.mark.parametrize("distance", [990.0, 1000.0, 1049.0, 40_010.0])
+def test_reception_of_radio_channel_has_classes_of_25_m_at_any_distance(distance: float) -> None:
+    """Half of the messages are lost by the loss model, which counts them itself."""
+    strong = {"path_loss": {"kind": "log_distance", "exponent": 2, "reference_loss_db": 0}, "shadowing_db": 0}
+    carrier = radio(1, loss={"kind": "bernoulli", "probability": 0.5}, line_of_sight="clear", **strong)
+    events, _ = exchange(carrier, {"A": (0.0, 0.0, 1.5), "B": (distance, 0.0, 1.5)}, 100)
+    outcomes = [event.outcome for event in events if event.sender == "A"]
+    delivered = outcomes.count("delivered")
+    assert 0 < delivered < len(outcomes)
+    assert carrier.statistics(5.0)["A", "B"].reception == ((25.0 * (distance // 25.0), len(outcomes), delivered),)
+
+
 def test_channel_busy_ratio_of_a_late_station_covers_its_own_time() -> None:
     """C enters in the middle of the run and measures the same channel busy ratio as the others."""
     carrier = radio(1, **QUIET)
