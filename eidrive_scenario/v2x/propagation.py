@@ -54,7 +54,7 @@ def blockage_moments(distance: Values, lower: Values, upper: Values, blocker: Va
     return np.where(over, 0.0, mean), np.where(over, 0.0, spread)
 
 
-def winner_b1(distance: Values, frequency_ghz: float, first: float, second: float) -> Array:
+def winner_b1(distance: Values, frequency_ghz: float, first: Values, second: Values) -> Array:
     """Return the LOS path loss of WINNER+ B1 [dB] over a distance [m], as adopted in 3GPP TR 36.885, A.1.4.
 
     `first` and `second` are the effective antenna heights: height above ground minus environment height [m]. Published
@@ -104,7 +104,7 @@ class LinkGeometry:
 
     distance      (M,) distance between the antennas [m]
     states        (M,) LOS, NLOSV or NLOS
-    lower, upper  (M,) heights of the lower and the higher antenna [m]
+    lower, upper  (M,) heights of the lower and the higher antenna above the ground [m]
     tops          (M,) top of the highest blocking vehicle [m]
     vehicles      (M,) number of blocking vehicles
     """
@@ -186,12 +186,12 @@ class _LossPerVehicle(Settings):
     """Decorrelation distance of the shadowing (correlation 1/e), with LOS, NLOSv and NLOS [m]."""
 
     @abstractmethod
-    def line_of_sight_loss(self, distance: Array | float, frequency_ghz: float) -> Array:
-        """Return the path loss with LOS [dB] at distances [m]."""
+    def line_of_sight_loss(self, between: LinkGeometry, frequency_ghz: float) -> Array:
+        """Return the path loss of links with LOS (M,) [dB]."""
 
     def loss(self, between: LinkGeometry, frequency_ghz: float, draws: Array) -> Array:
         """Return the path loss without shadowing (M,) [dB]; `draws` has no effect."""
-        clear = self.line_of_sight_loss(between.distance, frequency_ghz)
+        clear = self.line_of_sight_loss(between, frequency_ghz)
         if not between.states.any():
             return clear
         return np.select(
@@ -207,16 +207,19 @@ class WinnerB1(_LossPerVehicle):
     environment_height  height subtracted from the antenna heights [m]: 1.0 in 3GPP; 0.5 and 0 in the analytic models
                         of 802.11p and C-V2X. It changes the loss at 200 m by 16 dB
 
+    Antennas below ANTENNA_HEIGHT count as at this height, the lowest of the model.
     The NLOS loss is that of TR 37.885, because that of TR 36.885 requires the positions of street corners.
     """
 
     kind: Literal["winner_b1"]
     environment_height: Annotated[float, Field(ge=0.0, lt=ANTENNA_HEIGHT)] = 1.0
 
-    def line_of_sight_loss(self, distance: Array | float, frequency_ghz: float) -> Array:
-        """Return the path loss with LOS [dB] at distances [m], for antennas at ANTENNA_HEIGHT."""
-        height = ANTENNA_HEIGHT - self.environment_height
-        return winner_b1(distance, frequency_ghz, height, height)
+    def line_of_sight_loss(self, between: LinkGeometry, frequency_ghz: float) -> Array:
+        """Return the path loss of links with LOS (M,) [dB]."""
+        lower, upper = (
+            np.maximum(height, ANTENNA_HEIGHT) - self.environment_height for height in (between.lower, between.upper)
+        )
+        return winner_b1(between.distance, frequency_ghz, lower, upper)
 
 
 class LogDistance(_LossPerVehicle):
@@ -232,11 +235,11 @@ class LogDistance(_LossPerVehicle):
     reference_distance: Annotated[float, Field(ge=1.0, le=1000.0)] = 1.0
     reference_loss_db: Annotated[float, Field(ge=-200.0, le=1000.0)] | None = None
 
-    def line_of_sight_loss(self, distance: Array | float, frequency_ghz: float) -> Array:
-        """Return the path loss with LOS [dB] at distances [m]."""
+    def line_of_sight_loss(self, between: LinkGeometry, frequency_ghz: float) -> Array:
+        """Return the path loss of links with LOS (M,) [dB]."""
         reference = self.reference_loss_db
         at_reference = free_space(self.reference_distance, frequency_ghz) if reference is None else reference
-        return log_distance(distance, self.exponent, self.reference_distance, at_reference)
+        return log_distance(between.distance, self.exponent, self.reference_distance, at_reference)
 
 
 PathLoss = Annotated[Tr37885 | WinnerB1 | LogDistance, Field(discriminator="kind")]

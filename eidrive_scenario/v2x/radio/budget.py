@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -14,7 +13,6 @@ from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniform
 from eidrive_scenario.v2x.propagation import LinkGeometry, Tr37885, probability_of_los
 from eidrive_scenario.v2x.radio.profile import RadioProfile
 from eidrive_scenario.v2x.radio_environment import LOS, NLOSV, RadioEnvironment
-from eidrive_scenario.v2x.standards import ANTENNA_HEIGHT
 
 OUT_OF_REACH = 170.0
 """LOS path loss from which the line of sight is not determined, because no message is received [dB]."""
@@ -61,7 +59,6 @@ class LinkBudget:
         """Standard deviation of the shadowing by state [dB]."""
         self._reaches = np.array(path_loss.reaches if reach is None else (reach,) * 3)
         """Decorrelation distance of the shadowing by state [m]."""
-        self._reach = self._distance_of(OUT_OF_REACH)
         self._names: tuple[str, ...] = ()
         self._rows: dict[str, int] = {}
         self._first = self._second = np.zeros(0, dtype=np.int64)
@@ -94,17 +91,6 @@ class LinkBudget:
         states[:-1] = between.states
         square = links.take(self._pair_at, axis=1)
         return Budget(names, self._rows, square[0], square[1], square[2], states.take(self._pair_at), blockers)
-
-    def _distance_of(self, loss: float) -> float:
-        """Return the distance from which the LOS path loss is at least `loss` [dB], in meters."""
-        heights, draws = np.full(1, ANTENNA_HEIGHT), np.full(1, 0.5)
-        near, far = 1.0, 1e9
-        for _ in range(40):  # halves of ln 1e9 = 20.7: a relative error of 2e-11
-            middle = math.sqrt(near * far)
-            between = LinkGeometry.in_sight(np.full(1, middle), heights, heights)
-            there = self._profile.path_loss.loss(between, self._profile.frequency_ghz, draws)[0]
-            near, far = (near, middle) if there >= loss else (middle, far)
-        return far
 
     def _set_stations(self, names: tuple[str, ...]) -> None:
         """Replace the stations. Remaining pairs keep their shadowing."""
@@ -150,7 +136,9 @@ class LinkBudget:
             between.states[hidden], between.vehicles[hidden] = NLOSV, 1
             between.tops[hidden] = between.upper[hidden] + 0.1
         elif self._profile.line_of_sight == "rays" and surroundings.sight is not None and len(distance):
-            near = np.flatnonzero(distance < self._reach)
+            draws = np.full(len(distance), 0.5)  # without effect in line of sight
+            clear = self._profile.path_loss.loss(between, self._profile.frequency_ghz, draws)
+            near = np.flatnonzero(clear < OUT_OF_REACH)
             if self._pairs is None:
                 rows = zip(self._first.tolist(), self._second.tolist(), strict=True)
                 self._pairs = [(self._names[a], self._names[b]) for a, b in rows]

@@ -90,7 +90,7 @@ class RadioChannel(QueuedChannel):
         self._budget = None
         if not self.profile.jammers:
             return
-        self._jamming = self.profile.jamming_power(surroundings.positions)
+        self._jamming = self.profile.jamming_power(surroundings)
         self._senses_jammer = self._jamming >= 10.0 ** (ENERGY_DETECTION_DBM / 10.0)
         self._jammed = frozenset(surroundings.names[row] for row in np.flatnonzero(self._senses_jammer).tolist())
 

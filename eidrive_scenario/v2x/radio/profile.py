@@ -18,6 +18,7 @@ from eidrive_scenario.v2x.radio.access import QueueSettings
 from eidrive_scenario.v2x.radio.congestion import CongestionControl, NoDcc
 from eidrive_scenario.v2x.radio.packet_error import CURVE_RATE_MBPS, CURVES, ErrorCurve
 from eidrive_scenario.v2x.radio.resource_pool import NrSidelinkSettings, Pool, SidelinkSettings
+from eidrive_scenario.v2x.radio_environment import RadioEnvironment
 from eidrive_scenario.v2x.standards import (
     ANTENNA_HEIGHT,
     BITS_PER_SYMBOL,
@@ -210,13 +211,15 @@ class RadioProfile(ComposedProfile):
         los_loss = self.path_loss.loss(between, self.frequency_ghz, np.full(len(heights), 0.5))
         return table, np.maximum.accumulate(los_loss)
 
-    def jamming_power(self, positions: Array) -> Array:
-        """Return the power (N,) [mW] that antennas at `positions` (N, 3) receive from all jammers, in line of sight."""
+    def jamming_power(self, surroundings: RadioEnvironment) -> Array:
+        """Return the power (N,) [mW] that the stations receive from all jammers, in line of sight."""
+        positions, heights = surroundings.positions, surroundings.heights
         total = np.zeros(len(positions))
         for jammer in self.jammers:
             antenna = np.array([jammer.x, jammer.y, jammer.z])
-            heights, distance = positions[:, 2], np.linalg.norm(positions - antenna, axis=1)
-            between = LinkGeometry.in_sight(distance, np.minimum(heights, jammer.z), np.maximum(heights, jammer.z))
+            distance = np.linalg.norm(positions - antenna, axis=1)
+            other = jammer.z - (positions[:, 2] - heights)  # above the ground of the station; its own is unknown
+            between = LinkGeometry.in_sight(distance, np.minimum(heights, other), np.maximum(heights, other))
             loss = self.path_loss.loss(between, self.frequency_ghz, np.full(len(positions), 0.5))
             total += 10.0 ** ((jammer.power_dbm + self.antenna_gain_dbi - loss) / 10.0)
         return total

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 from pydantic import ValidationError
 from radio_traffic import DT, QUIET, exchange, message, radio
@@ -22,13 +21,24 @@ def jammer(x: float, power: float) -> dict[str, list[dict[str, float]]]:
 
 def test_received_power_is_that_of_friis_and_adds_up() -> None:
     """20 lg(4 pi d f / c) with c = 3e8 m/s: 87.86 dB at 100 m and 5.9 GHz."""
-    positions = np.array([[100.0, 0.0, 1.5], [200.0, 0.0, 1.5]])
-    power = RadioProfile.model_validate({**FREE, **jammer(0.0, 33.0)}).jamming_power(positions)
+    stations = RadioEnvironment({"A": (100.0, 0.0, 1.5), "B": (200.0, 0.0, 1.5)})
+    power = RadioProfile.model_validate({**FREE, **jammer(0.0, 33.0)}).jamming_power(stations)
     loss = 20.0 * math.log10(4.0 * math.pi * 100.0 * 5.9e9 / 3e8)
     assert 10.0 * math.log10(power[0]) == pytest.approx(33.0 + 3.0 - loss)
     assert power[0] / power[1] == pytest.approx(4.0)
     two = {"jammers": 2 * jammer(0.0, 33.0)["jammers"]}
-    assert RadioProfile.model_validate({**FREE, **two}).jamming_power(positions) == pytest.approx(2.0 * power)
+    assert RadioProfile.model_validate({**FREE, **two}).jamming_power(stations) == pytest.approx(2.0 * power)
+
+
+def test_received_power_is_that_of_the_heights_above_the_ground() -> None:
+    """WINNER+ B1 with antennas at 1.5 m on a plateau of 100 m, as on a plain."""
+    power = []
+    for ground in (0.0, 100.0):
+        settings = {"path_loss": {"kind": "winner_b1"}, "jammers": [{"x": 0.0, "y": 0.0, "z": ground + 1.5}]}
+        stations = RadioEnvironment({"A": (200.0, 0.0, ground + 1.5)}, grounds={"A": ground})
+        power.append(float(RadioProfile.model_validate(settings).jamming_power(stations)[0]))
+    assert power[1] == pytest.approx(power[0])
+    assert 10.0 * math.log10(power[0]) == pytest.approx(30.0 + 3.0 - 112.1, abs=0.1)
 
 
 @pytest.mark.parametrize("stations", [2, 6])

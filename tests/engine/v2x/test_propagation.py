@@ -100,6 +100,33 @@ def test_blockage_loss_has_mean_and_spread_of_tr_37_885() -> None:
         assert extra.min() >= 0.0
 
 
+@pytest.mark.parametrize(
+    ("lower", "upper", "environment_height", "effective"),
+    [
+        (1.5, 6.0, 1.0, (0.5, 5.0)),
+        (1.5, 6.0, 0.5, (1.0, 5.5)),
+        (2.0, 3.5, 0.0, (2.0, 3.5)),
+        (0.3, 1.0, 1.0, (0.5, 0.5)),
+    ],
+)
+def test_winner_b1_subtracts_environment_height_of_each_antenna(
+    lower: float, upper: float, environment_height: float, effective: tuple[float, float]
+) -> None:
+    """TR 36.885, A.1.4: 40 lg d + 7.56 - 17.3 lg h1' - 17.3 lg h2' + 2.7 lg f beyond 4 h1' h2' f / c, before that
+    22.7 lg d + 27 + 20 lg f, and at least the loss of free space. Antennas below 1.5 m count as 1.5 m.
+    """
+    model = WinnerB1(kind="winner_b1", environment_height=environment_height)
+    h1, h2 = effective
+    break_point = 4.0 * h1 * h2 * 5.9e9 / 3e8
+    for distance in (15.0, 0.9 * break_point, 1.1 * break_point, 1000.0):
+        near = 22.7 * math.log10(distance) + 27.0 + 20.0 * math.log10(5.9)
+        far = 40.0 * math.log10(distance) + 7.56 - 17.3 * math.log10(h1 * h2) + 2.7 * math.log10(5.9)
+        sight = between(LOS, distance, lower=lower, upper=upper)
+        free = 20.0 * math.log10(distance) + 46.4 + 20.0 * math.log10(5.9 / 5.0)
+        expected = max(near if distance < break_point else far, free)
+        assert model.loss(sight, 5.9, np.array([0.5]))[0] == pytest.approx(expected, abs=1e-9)
+
+
 def test_winner_b1_adds_a_loss_per_vehicle() -> None:
     model = WinnerB1(kind="winner_b1")
     half = np.array([0.5])
