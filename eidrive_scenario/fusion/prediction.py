@@ -43,19 +43,23 @@ One lost message about an object at rest, which is reported once per second (ETS
 """
 
 
+def added_variance(variance: Array | float, step: Array | float) -> Array:
+    """Return the variance that `predict` adds to each coordinate of a position in `step` [s], at least 0 [m²].
+
+    variance  of the velocity in each axis before [m²/s²]
+    """
+    return np.asarray(variance * step**2 + ACCELERATION_DENSITY * step**3 / 3.0)
+
+
 def is_predictable(covariance: Array, age: Array, max_age: float) -> Bools:
     """Return whether tracks (N,) are predicted as precisely as an object with a reported velocity for `max_age` [s].
 
     covariance  (N, 4, 4) after the prediction by `age` (N,) [s]
-
-    Their velocities had the variance v² in each axis, so that prediction has added v² t² + ACCELERATION_DENSITY t³ / 3
-    to each coordinate of their positions.
     """
     age = np.abs(age)
     variance = 0.5 * (covariance[:, 2, 2] + covariance[:, 3, 3]) - ACCELERATION_DENSITY * age
-    added = variance * age**2 + ACCELERATION_DENSITY * age**3 / 3.0
-    limit = KNOWN_SPEED**2 * max_age**2 + ACCELERATION_DENSITY * max_age**3 / 3.0
-    return np.asarray(added <= limit + EPSILON)
+    limit = added_variance(KNOWN_SPEED**2, max_age)
+    return np.asarray(added_variance(variance, age) <= limit + EPSILON)
 
 
 def predict(mean: Array, covariance: Array, step: Array, turn: Array, turning: Bools) -> tuple[Array, Array]:

@@ -18,9 +18,11 @@ from eidrive_scenario.driving.communication.own_body import OwnBody
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.fusion.method import FusionMethod, Report
+from eidrive_scenario.fusion.prediction import added_variance
 from eidrive_scenario.perception.lidar.station import StationLidars
 from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.result_checks import describe
+from eidrive_scenario.perception.tracking.motion_models import ACCELERATION_DENSITY, KNOWN_SPEED, UNKNOWN_SPEED
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseUncertainty, pose_covariance_at
 from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.v2x.messages.feature_frames import FeatureFrame
@@ -54,7 +56,8 @@ class PartialReportAssembler:
     def update(self, ids: Sequence[int], detections: Detections) -> Detections:
         """Add a message; return all known objects predicted to the time of the newest measurement.
 
-        Objects are predicted at their last velocity; objects of unknown velocity keep their position.
+        Objects are predicted at their last velocity; objects of unknown velocity keep their position. Their covariances
+        grow as those of predicted tracks.
 
         ids         of the objects in the message
         detections  those of them that are not the ego body, with their ids
@@ -75,6 +78,12 @@ class PartialReportAssembler:
         predicted = Detections.concatenate(time, objects)
         age = time - np.array([known_object.time for known_object in objects])
         predicted.boxes[:, :2] += np.nan_to_num(predicted.velocity) * age[:, None]
+        moving = np.isfinite(predicted.velocity).all(axis=1)
+        variance = np.where(moving, predicted.velocity_deviation or KNOWN_SPEED, UNKNOWN_SPEED) ** 2
+        if len(predicted.velocity_variance):
+            variance = np.maximum(variance, predicted.velocity_variance)
+            predicted.velocity_variance[:] += ACCELERATION_DENSITY * age
+        predicted.covariance[:] += added_variance(variance, age)[:, None, None] * np.eye(2)
         return predicted
 
 
