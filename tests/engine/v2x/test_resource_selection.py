@@ -34,12 +34,14 @@ def sensed(
     own: tuple[int, ...] = (),
     sci: Any = (),
     ahead: int = 0,
+    repeats: bool = True,
     bands: int = BANDS,
 ) -> Sensed:
     """Return sensing results from S-RSSI by (subframe, subchannel), own subframes and decoded SCI.
 
-    sci    rows of (subframe, subchannel, width, RSRP)
-    ahead  subframes from each SCI to a later transmission of its message; 0: it reserves for the next message
+    sci      rows of (subframe, subchannel, width, RSRP)
+    ahead    subframes from each SCI to a transmission of its message
+    repeats  whether each SCI also reserves for the next message
     """
     power, monitored = np.zeros((WINDOW, bands), dtype=np.float32), np.ones(WINDOW, dtype=np.bool_)
     for (subframe, band), value in (rssi or {}).items():
@@ -49,7 +51,8 @@ def sensed(
     decoded, first, widths = (columns[:, place].astype(np.int64) for place in range(3))
     unheard = np.array(own, dtype=np.int64)
     rsrp = columns[:, 3].astype(np.float32)
-    return Sensed(power, monitored, unheard, decoded, np.full_like(decoded, ahead), first, widths, rsrp)
+    offsets, periodic = np.full_like(decoded, ahead), np.full_like(decoded, repeats)
+    return Sensed(power, monitored, unheard, decoded, offsets, periodic, first, widths, rsrp)
 
 
 def as_pairs(request: Request, history: Sensed, order: NDArray[np.float64] | None) -> set[tuple[int, int]]:
@@ -175,9 +178,24 @@ def test_mode_2_excludes_later_transmissions_of_a_message_once() -> None:
     """SCI in 4990 announces a transmission in 5010; with a window of 20 ms it would repeat in 5030."""
     request = replace(REQUEST, last=NOW + 60, interval=20, span=60)
     everything = {(5001 + y, x) for y in range(60) for x in range(4)}
-    announced = sensed(sci=[(4990, 2, 1, -90.0)], ahead=20)
+    announced = sensed(sci=[(4990, 2, 1, -90.0)], ahead=20, repeats=False)
     assert everything - reported_in_mode_2(request, announced) == {(5010, 2)}
-    assert reported_in_mode_2(request, sensed(sci=[(4990, 2, 1, -90.0)], ahead=5)) == everything, "the slot has passed"
+    passed = sensed(sci=[(4990, 2, 1, -90.0)], ahead=5, repeats=False)
+    assert reported_in_mode_2(request, passed) == everything, "the slot has passed"
+
+
+@pytest.mark.parametrize(
+    ("interval", "slots"), [(100, {5070}), (50, {5020, 5070}), (20, {5010, 5030, 5050, 5070, 5090})]
+)
+def test_mode_2_excludes_later_transmissions_of_the_next_messages(interval: int, slots: set[int]) -> None:
+    """TS 38.214, 8.1.4, step 6c: SCI in 4990 or 4950 of a transmission 20 slots later is assumed again in the next
+    intervals, Q = 100 / interval of them, or one if it is older than an interval.
+    """
+    sci = 4990 if interval == 20 else 4950
+    everything = {(5001 + y, x) for y in range(100) for x in range(4)}
+    announced = sensed(sci=[(sci, 2, 1, -90.0)], ahead=20)
+    reported = reported_in_mode_2(replace(REQUEST, interval=interval), announced)
+    assert everything - reported == {(slot, 2) for slot in slots}
 
 
 @pytest.mark.parametrize(("share", "last"), [(0.2, 5021), (0.35, 5039), (0.5, 5051)])

@@ -59,8 +59,9 @@ class Sensed:
     rssi       (WINDOW, S) S-RSSI of slot z in row z mod WINDOW, 0 where not monitored [mW]
     monitored  (WINDOW,) whether the station received in that slot
     own        (Z,) slots of the transmissions of the station
-    decoded    (R,) slots of decoded SCI, ahead (R,) slots from there to a later transmission of the message, or 0 for
-               the next message; bands (R,) first subchannels, widths (R,), and rsrp (R,) [dBm]
+    decoded    (R,) slots of decoded SCI, ahead (R,) slots from there to a transmission of the message, 0 for its own;
+               repeats (R,) whether it also reserves that of the next message, an interval later; bands (R,) first
+               subchannels, widths (R,), and rsrp (R,) [dBm]
     """
 
     rssi: NDArray[np.float32]
@@ -68,6 +69,7 @@ class Sensed:
     own: Integers
     decoded: Integers
     ahead: Integers
+    repeats: Integers
     bands: Integers
     widths: Integers
     rsrp: NDArray[np.float32]
@@ -82,9 +84,9 @@ def candidates(request: Request, sensed: Sensed, order: Array | None) -> Integer
     bands = sensed.rssi.shape[1]
     slots = request.starts + request.length - 1
     reserved, blind = np.full((slots, bands), -np.inf), np.full((slots, 1), -np.inf)
-    _mark(reserved, request, sensed.decoded, sensed.ahead, sensed.bands, sensed.widths, sensed.rsrp)
+    _mark(reserved, request, sensed.decoded, sensed.ahead, sensed.repeats, sensed.bands, sensed.widths, sensed.rsrp)
     zeros = np.zeros_like(sensed.own)
-    _mark(blind, request, sensed.own, zeros, zeros, zeros + 1, np.inf)
+    _mark(blind, request, sensed.own, zeros, zeros + 1, zeros, zeros + 1, np.inf)
     highest = _over(np.maximum(reserved, blind), request).max(axis=(2, 3)).ravel()
     least = math.ceil(request.share * len(highest) - 1e-9)
     if order is None and np.isposinf(highest).sum() > len(highest) - least:
@@ -102,6 +104,7 @@ def _mark(
     request: Request,
     decoded: Integers,
     ahead: Integers,
+    repeats: Integers,
     bands: Integers,
     widths: Integers,
     power: NDArray[np.float32] | float,
@@ -113,12 +116,12 @@ def _mark(
     if not len(decoded):
         return
     interval = request.interval
-    repeats = -(-request.span // interval) if interval < request.span else 1  # Q
+    periods = -(-request.span // interval) if interval < request.span else 1  # Q
     recent = request.now - decoded <= interval
     powers = np.broadcast_to(np.asarray(power, dtype=np.float64), decoded.shape)
-    for repeat in range(repeats + 1):
-        use = decoded + ahead + repeat * interval
-        counts = ahead > 0 if repeat == 0 else (ahead == 0) & (recent | (repeat == 1))
+    for period in range(periods + 1):
+        use = decoded + ahead + period * interval
+        counts = ahead > 0 if period == 0 else (repeats > 0) & (recent | (period == 1))
         if not counts.any():
             continue
         start = (use - request.first) % interval

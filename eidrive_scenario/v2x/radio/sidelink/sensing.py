@@ -87,13 +87,14 @@ CAPACITY = 256
 class Reservations:
     """Decoded control information of the last `span` slots that reserves resources.
 
-    resources  (R, 4) slot, slots to a later transmission or 0, first subchannel and number of subchannels
+    resources  (R, 5) slot, slots to a transmission of the message, 0 for its own, whether it reserves for the next one,
+               first subchannel and number of subchannels
     rsrp       (R, N) PSSCH-RSRP [dBm]; -inf if not decoded
     """
 
     stations: int
     span: int
-    resources: Integers = field(default_factory=lambda: np.zeros((CAPACITY, 4), dtype=np.int64))
+    resources: Integers = field(default_factory=lambda: np.zeros((CAPACITY, 5), dtype=np.int64))
     begin: int = 0
     end: int = 0
 
@@ -109,13 +110,13 @@ class Reservations:
         self.resources[rows], self.rsrp[rows] = resources, rsrp
         self.end += count
 
-    def of(self, row: int, now: int) -> tuple[Integers, Integers, Integers, Integers, NDArray[np.float32]]:
+    def of(self, row: int, now: int) -> tuple[Integers, Integers, Integers, Integers, Integers, NDArray[np.float32]]:
         """Return the reservations and their PSSCH-RSRP that a station decoded in the span before slot `now`."""
         self._forget(now)
         rsrp = self.rsrp[self.begin : self.end, row]
         decoded = np.flatnonzero(rsrp > NOT_DECODED)
-        slots, ahead, bands, widths = self.resources[decoded + self.begin].T
-        return slots, ahead, bands, widths, rsrp[decoded]
+        slots, ahead, repeats, bands, widths = self.resources[decoded + self.begin].T
+        return slots, ahead, repeats, bands, widths, rsrp[decoded]
 
     def rearrange(self, rows: Sequence[int | None]) -> None:
         """Keep the columns of these former rows; None: a new station."""
@@ -131,7 +132,7 @@ class Reservations:
         size = len(self.resources)
         while kept + count > size // 2:
             size *= 2
-        resources = np.zeros((size, 4), dtype=np.int64)
+        resources = np.zeros((size, 5), dtype=np.int64)
         rsrp = np.full((size, self.stations), NOT_DECODED, dtype=np.float32)
         resources[:kept], rsrp[:kept] = self.resources[live], self.rsrp[live]
         self.resources, self.rsrp, self.begin, self.end = resources, rsrp, 0, kept
@@ -188,9 +189,9 @@ class SensingHistory:
         return counts / self.rssi.shape[1], len(rows) - monitored.sum(axis=0)
 
     def reserve(self, pdus: Pdus, codes: Codes, rsrp: Array) -> None:
-        """Add the reservations in decoded control information: of retransmissions, and of the next interval."""
+        """Add the reservations in decoded control information: of retransmissions, and of all in the next interval."""
         reserved = [
-            (index, slot, ahead, band, transmission.bands)
+            (index, slot, ahead, transmission.reserves, band, transmission.bands)
             for index, (slot, transmission) in enumerate(zip(pdus.slots.tolist(), pdus.transmissions, strict=True))
             for ahead, band in (*transmission.later, *[(0, transmission.first_band)] * transmission.reserves)
         ]
