@@ -11,7 +11,7 @@ from itertools import pairwise
 import pytest
 from recorded_scene import RunScene
 from storyboard_xml import lane_position_xml, speed_xml, teleport_xml, world_position_xml
-from street_scene import NOTHING, after
+from street_scene import NOTHING, OPENING, after
 from trajectories import CORNER, follow_points
 from whole_run import Run
 
@@ -129,6 +129,20 @@ def test_lane_change_to_missing_lane_is_rejected(scene: RunScene) -> None:
         ScenarioError, match=r"LaneChangeAction: the target lane does not exist .*got -4; expected one of 1, -1, -2"
     ):
         scene(1, ("Ego", change(lane(-4))))
+
+
+def test_lane_change_to_the_oncoming_lane_before_a_new_lane(scene: RunScene) -> None:
+    """Lane 1, in which Other drives, is linked; the new lane -1 between both cars has no counterpart."""
+    change_lane = change(beside(0, "Other"), "linear", "time", 1)
+    played = scene(2, ("Ego", change_lane), ego=(-1, 150, 20), other=(1, 300, 0), street=OPENING)
+    assert played.at(2.0).y == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(("ego", "other", "count"), [(-1, -1, 0), (-2, -1, 0), (-2, -2, 1)])
+def test_lane_change_to_a_lane_that_begins_ahead_is_rejected(scene: RunScene, ego: int, other: int, count: int) -> None:
+    """The target is the new lane -1, in the middle of the road, where lanes 1 and -1 meet at Ego."""
+    with pytest.raises(ScenarioError, match=r"target lane does not exist on road '1' at s = 150\.0 m, as it begins"):
+        scene(1, ("Ego", change(beside(count, "Other"))), ego=(ego, 150, 20), other=(other, 300, 0), street=OPENING)
 
 
 @pytest.mark.parametrize("number", ["--1", "left", "²", "-"])

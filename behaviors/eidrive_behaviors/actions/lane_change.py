@@ -252,7 +252,12 @@ class LaneChangeAction(ActionBehaviour):
         between = self._roads.lanes_between(here, reference)
         if runs is None or between is None:
             return count_lanes(reference.lane, count)
-        return count_lanes(here.lane, between + count * runs)
+        lane = count_lanes(here.lane, between + count * runs)
+        if all(lane * other * runs < 0 for other in (reference.lane, count_lanes(reference.lane, count))):
+            # A lane beside the middle of the road has no counterpart; the next lane is on the other side of the road
+            where = f"road {here.road!r} at s = {here.s:.1f} m, as it begins or ends between the actor and {name!r}"
+            raise self.error(f"the target lane does not exist on {where}")
+        return lane
 
     def _set_driver_goal(self) -> Status:
         """Hand the path of the transition to the driver. It is complete when the vehicle drives in the new lane.

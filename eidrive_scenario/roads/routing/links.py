@@ -156,8 +156,9 @@ def _nearest_end(road: Road, side: int, other: Road) -> Contact:
 def lanes_between(roads: Mapping[str, Road], links: LaneLinks, a: LaneLocation, b: LaneLocation, runs: int) -> int:
     """Return the number of lanes from the lane of a to that of b, positive in the direction of t at a.
 
-    The lane of a is followed along its links. If it does not reach b, the nearest lane beside it that does is followed,
-    first of those on its side of the road; without any, the lanes keep their numbers.
+    Lanes are followed along their links. If that of b has no counterpart at a, the lanes at b are counted: from the
+    continuation of the lane of a, else from that of the nearest lane beside it, first of those on its side of the road.
+    Without any, the lanes keep their numbers.
 
     runs  1 if s at b increases in the direction of s at a, else -1
     """
@@ -166,6 +167,10 @@ def lanes_between(roads: Mapping[str, Road], links: LaneLinks, a: LaneLocation, 
     beside = sorted((lane for lane in here.lanes if lane), key=lambda lane: (lane * a.lane < 0, abs(_rank(lane) - own)))
     for lane in beside:
         reached = links.continued(LaneKey(a.road, here.index, lane), b.road, there.index)
+        if reached != b.lane and lane == a.lane:
+            counterpart = links.continued(LaneKey(b.road, there.index, b.lane), a.road, here.index)
+            if counterpart:
+                return _rank(counterpart) - own
         if reached:
             return (_rank(b.lane) - _rank(reached)) * runs + _rank(lane) - own
     return _rank(b.lane * runs) - own

@@ -32,6 +32,18 @@ def street(lanes: str = LANES, *, profiles: str = "", extra: str = "") -> str:
 
 
 STREET = street()
+OPENING = street(
+    section_xml(
+        lane_xml(1, 4, link=lane_links_xml(after=1)),
+        lane_xml(-1, 4, link=lane_links_xml(after=-2)) + lane_xml(-2, 4, link=lane_links_xml(after=-3)),
+    )
+    + section_xml(
+        lane_xml(1, 4, link=lane_links_xml(before=1)),
+        lane_xml(-1, 4) + lane_xml(-2, 4, link=lane_links_xml(-1)) + lane_xml(-3, 4, link=lane_links_xml(-2)),
+        s=200.0,
+    )
+)
+"""Street on which a new lane -1 begins at s = 200, and lanes -1 and -2 continue as -2 and -3, 4 m to the right."""
 THROUGH = lane_links_xml(-1, -1)
 """Links of lane -1 to the lanes -1 before and after it."""
 
