@@ -11,6 +11,7 @@ from itertools import pairwise
 import pytest
 from eidrive_behaviors.actions.speed import duration_over
 from eidrive_behaviors.actions.speed_profile import smoothed_segments
+from opendrive_xml import lanes_xml, map_xml, road_xml
 from recorded_scene import RunScene
 from street_scene import after
 from whole_run import Run
@@ -463,6 +464,24 @@ def test_synchronize_at_any_time_step_ends_at_the_arrival(scene: RunScene, dt: f
     played = scene(6, ("Other", action), dt=dt, other=(-2, 150.0, 10.0))
     assert played.when("action 0", "completeState") == pytest.approx(5.0)
     assert played.at(5.0, "Other").x == pytest.approx(220.0)
+
+
+@pytest.mark.parametrize("curvature", [0.0, 0.01])
+def test_synchronize_in_a_bend_keeps_its_constant_deceleration(scene: RunScene, curvature: float) -> None:
+    """Other drives 102 m to its target in 10.2 s, Ego 88 m at 10 m/s and then 2 · 88 / 10.2 - 10 = 7.25 m/s.
+
+    In the bend of 100 m to the left the radius is 102 m in lane -1 and 110 m in lane -3.
+    """
+    ways = 102.0 / (1.0 + 2.0 * curvature), 88.0 / (1.0 + 10.0 * curvature)
+    action = f"""<PrivateAction><SynchronizeAction masterEntityRef="Other">
+      <TargetPositionMaster><LanePosition roadId="1" laneId="-1" s="{100.0 + ways[0]}"/></TargetPositionMaster>
+      <TargetPosition><LanePosition roadId="1" laneId="-3" s="{100.0 + ways[1]}"/></TargetPosition>
+      </SynchronizeAction></PrivateAction>"""
+    street = map_xml(road_xml(length=600.0, curvature=curvature, lanes=lanes_xml(1, 3, 4)))
+    played = scene(10.1, ("Ego", action), ego=(-3, 100.0, 10.0), other=(-1, 100.0, 10.0), street=street, dt=0.02)
+    last = 2.0 * 88.0 / 10.2 - 10.0
+    for time in (2.0, 5.0, 8.0, 10.0):
+        assert played.at(time).speed == pytest.approx(10.0 + (last - 10.0) * time / 10.2, abs=0.03)
 
 
 @pytest.mark.element("SynchronizeAction")

@@ -22,13 +22,15 @@ from eidrive_scenario.api.actions import (
     resolve_position,
     trajectory_of,
 )
-from eidrive_scenario.api.common import EPSILON
+from eidrive_scenario.api.common import EPSILON, LaneLocation, RoadNetwork, Route
 
 JUST_PASSED = 10.0
 """Distance behind the actor, besides that of one step, up to which it has passed its target [m]; it drives around to a
 target farther behind."""
 ON_LINE = 0.1
 """Maximum speed difference to the linear last phase at which the first phase ends [m/s]."""
+MOST_ITERATIONS = 10
+"""Maximum number of iterations for the distance along a lane; one suffices where its curvature is constant."""
 HARD = 8.0
 """Deceleration if the distance is too short for a lower one [m/s²]."""
 
@@ -56,7 +58,7 @@ class SynchronizeAction(ActionBehaviour):
     uses the mean speed of that instant as its final speed. A steady state at the end shortens distance and time.
     A target relative to entities moves: it is expected at the arrival of the master where the speed of its last step
     brings it. The action ends with that arrival, also if the actor has overtaken its target.
-    Distances are measured along the trajectory that an entity follows, else along the roads. An entity with a negative
+    Distances are measured along the trajectory that an entity follows, else along its lane. An entity with a negative
     speed arrives backwards. A final speed opposite to the direction of motion cannot be reached on the way to the
     target: the actor arrives at standstill and changes to the final speed at once, which is a warning. The maximum
     speed of a vehicle limits its speed; if it therefore arrives late, this is a warning as well.
@@ -201,8 +203,8 @@ class SynchronizeAction(ActionBehaviour):
     def _distance(self, name: str, position: model.Position, sense: float) -> float:
         """Return the distance of an entity to its target in its direction of motion [m]; negative after the target.
 
-        It is measured along its trajectory, its route, or the shortest way over the roads ahead. `sense` is -1 for an
-        entity that drives backwards.
+        It is measured along its trajectory, or along its lane on its route or the shortest way over the roads ahead.
+        `sense` is -1 for an entity that drives backwards.
         """
         actor = self.context.actors[name]
         if actor.progress is not None:
@@ -219,15 +221,13 @@ class SynchronizeAction(ActionBehaviour):
         route = actor.motion.route
         on_route = None if route is None else roads.distance(start, target.location, route=route)
         if on_route is not None:
-            return on_route[0] * sense
+            return _along_lane(roads, start, target.location, on_route[0], route) * sense
         shortest = roads.distance(start, target.location)
         if shortest is None:
             return straight
-        way = shortest[0] * sense
-        if way > -JUST_PASSED - abs(self.context.speed(name)) * self.context.dt:
-            return way
-        ahead = roads.distance(start, target.location, sense=1 if sense > 0.0 else -1)
-        return way if ahead is None else abs(ahead[0])
+        if shortest[0] * sense <= -JUST_PASSED - abs(self.context.speed(name)) * self.context.dt:
+            shortest = roads.distance(start, target.location, sense=1 if sense > 0.0 else -1) or shortest
+        return _along_lane(roads, start, target.location, shortest[0], route) * sense
 
     def _along(self, progress: TrajectoryProgress, name: str, position: model.Position, sense: float) -> float:
         """Return the distance along the trajectory of the entity, in its direction of motion [m]."""
@@ -275,3 +275,22 @@ class SynchronizeAction(ActionBehaviour):
     def describe(self) -> str:
         """Describe the master."""
         return f"arrive together with {self.action.master_entity_ref}"
+
+
+def _along_lane(
+    roads: RoadNetwork, start: LaneLocation, target: LaneLocation, distance: float, route: Route | None
+) -> float:
+    """Return the distance along the lane of `start` until it is beside `target` [m].
+
+    distance  distance along the reference lines [m]; the result if the lane does not lead to the target
+    """
+    length = distance
+    for _ in range(MOST_ITERATIONS):
+        there = roads.advance(start, length, route=route)
+        rest = None if there is None else roads.distance(there, target)
+        if rest is None or abs(rest[0]) >= abs(distance):
+            break
+        if abs(rest[0]) < EPSILON:
+            return length
+        length *= distance / (distance - rest[0])
+    return distance
