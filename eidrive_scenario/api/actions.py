@@ -47,6 +47,8 @@ from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryProgress
 from eidrive_scenario.storyboard.kinematics.trajectory_sampling import on_surface as on_surface
 from eidrive_scenario.storyboard.kinematics.trajectory_sampling import sample_trajectory as sample_trajectory
 from eidrive_scenario.storyboard.kinematics.transition_profile import TransitionProfile as TransitionProfile
+from eidrive_scenario.storyboard.positions.distances import TIME_DELTA as TIME_DELTA
+from eidrive_scenario.storyboard.positions.distances import MovedContext as MovedContext
 from eidrive_scenario.storyboard.positions.distances import closing_speed as closing_speed
 from eidrive_scenario.storyboard.positions.distances import distance as distance
 from eidrive_scenario.storyboard.positions.distances import entity_box as entity_box

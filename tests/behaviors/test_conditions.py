@@ -211,6 +211,27 @@ def test_time_headway_of_standing_entity_is_infinite(scene: RunScene) -> None:
     assert first_start(scene(0.5, ("Ego", NOTHING, by_entity_xml(condition)), ego=(-1, 100, 0))) == 0.0
 
 
+@pytest.mark.parametrize(
+    "position",
+    [
+        '<RelativeLanePosition entityRef="Other" dLane="0" ds="0"/>',
+        '<RelativeLanePosition entityRef="Other" dLane="0" dsLane="0"/>',
+        '<RelativeRoadPosition entityRef="Other" ds="0" dt="0"/>',
+        '<RelativeWorldPosition entityRef="Other" dx="0" dy="0"/>',
+        '<RelativeObjectPosition entityRef="Other" dx="0" dy="0"/>',
+    ],
+)
+@pytest.mark.parametrize("kind", ["longitudinal", "euclidianDistance"])
+def test_time_to_collision_with_a_position_that_moves(scene: RunScene, position: str, kind: str) -> None:
+    """50 m less 10 m/s · t at 20 - 10 m/s: 5 s - t."""
+    condition = by_entity_xml(
+        '<TimeToCollisionCondition freespace="false" rule="lessThan" value="4.45" coordinateSystem="road" '
+        f'relativeDistanceType="{kind}"><TimeToCollisionConditionTarget><Position>{position}</Position>'
+        "</TimeToCollisionConditionTarget></TimeToCollisionCondition>"
+    )
+    assert first_start(scene(2, ("Ego", NOTHING, condition))) == pytest.approx(0.6)
+
+
 def test_time_to_collision_of_departing_entity_is_undefined(scene: RunScene) -> None:
     condition = (
         '<TimeToCollisionCondition freespace="false" rule="greaterThan" value="0"><TimeToCollisionConditionTarget>'

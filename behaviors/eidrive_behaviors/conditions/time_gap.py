@@ -5,7 +5,14 @@ from __future__ import annotations
 import math
 
 from eidrive_behaviors.conditions.distance import GapCondition, current_place
-from eidrive_scenario.api.actions import ConditionContext, ResolvedPosition, closing_speed, model
+from eidrive_scenario.api.actions import (
+    TIME_DELTA,
+    ConditionContext,
+    MovedContext,
+    ResolvedPosition,
+    closing_speed,
+    model,
+)
 from eidrive_scenario.api.common import EPSILON
 
 
@@ -28,7 +35,8 @@ class TimeHeadwayCondition(GapCondition):
 class TimeToCollisionCondition(GapCondition):
     """Distance to an entity or position over the closing speed [s]; undefined if the distance does not shrink.
 
-    The closing speed is measured in the same coordinate system and along the same axis as the distance.
+    The closing speed is measured in the same coordinate system and along the same axis as the distance. A position
+    moves with the entities that it refers to.
     """
 
     element: model.TimeToCollisionCondition
@@ -41,11 +49,23 @@ class TimeToCollisionCondition(GapCondition):
 
     def quantity(self, context: ConditionContext, entity: str) -> float:
         """Return the time to collision [s]."""
-        to = self._target(context, entity)
-        if to is None:
+        to, later = (self._target(at, entity) for at in (context, MovedContext(context, TIME_DELTA)))
+        if to is None or later is None:
             return math.nan
-        gap, how = self.gap(context, entity, to), self.element.routing_algorithm
-        closing = closing_speed(context, entity, to, frame=self.frame, kind=self.kind, algorithm=how)
+        velocity = (0.0, 0.0, 0.0)
+        if isinstance(to, ResolvedPosition) and isinstance(later, ResolvedPosition):
+            x, y, z = ((after - now) / TIME_DELTA for now, after in zip(to.pose[:3], later.pose[:3], strict=True))
+            velocity = x, y, z
+        closing = closing_speed(
+            context,
+            entity,
+            to,
+            frame=self.frame,
+            kind=self.kind,
+            algorithm=self.element.routing_algorithm,
+            velocity=velocity,
+        )
+        gap = self.gap(context, entity, to)
         return abs(gap) / closing if closing > EPSILON else math.nan
 
     def _target(self, context: ConditionContext, entity: str) -> str | ResolvedPosition | None:

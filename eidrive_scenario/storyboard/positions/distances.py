@@ -8,12 +8,15 @@ from eidrive_scenario.base.geometry import box_distance
 from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Chain, LaneLocation, Pose, RoadNetwork
-from eidrive_scenario.storyboard.context.contexts import ConditionContext
+from eidrive_scenario.storyboard.context.contexts import ConditionContext, EntityAbsentError
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryProgress
 
 Box = tuple[float, float, float, float, float, float, float]
 """x, y, z of the center, length, width, height [m], yaw [rad]."""
+
+Velocity = tuple[float, float, float]
+"""Velocity along x, y and z [m/s]."""
 
 
 def entity_box(context: ConditionContext, name: str) -> Box:
@@ -185,6 +188,30 @@ def same_way(context: ConditionContext, a: str, b: str, frame: str) -> float:
     return 1.0 if math.cos(turn) >= 0.0 else -1.0
 
 
+class MovedContext(ConditionContext):
+    """State of the run whose actors have moved for a duration [s] at their current velocities and yaw rates."""
+
+    def __init__(self, context: ConditionContext, duration: float) -> None:
+        self.__dict__.update(vars(context))
+        self._now, self._duration = context, duration
+
+    def pose(self, name: str) -> Pose:
+        """Return the pose of an actor after the duration. Raise EntityAbsentError if it is not in the view."""
+        pose = self._position(name).pose
+        return pose.turned(float(self.view.yaw_rate[self.view.row(name)]) * self._duration)
+
+    def location(self, name: str) -> LaneLocation | None:
+        """Return the lane location of an actor after the duration. Raise EntityAbsentError if it is not in the view."""
+        return self._position(name).location
+
+    def _position(self, name: str) -> ResolvedPosition:
+        now = self._now
+        if name not in now.view:
+            raise EntityAbsentError(name)
+        position = ResolvedPosition(now.pose(name), now.location(name))
+        return _moved(now, position, _velocity(now, name), self._duration)
+
+
 def closing_speed(
     context: ConditionContext,
     a: str,
@@ -193,13 +220,14 @@ def closing_speed(
     frame: str,
     kind: str,
     algorithm: model.RoutingAlgorithm | None = None,
+    velocity: Velocity = (0.0, 0.0, 0.0),
 ) -> float:
     """Return the closing speed of actor `a` and `b` [m/s] in the frame and kind of their distance.
 
     Return NaN if the frame defines no distance. Both move at their current velocities, also along roads and
-    trajectories; a position does not move.
+    trajectories; that of a position is `velocity`.
     """
-    mine, theirs = _velocity(context, a), _velocity(context, b) if isinstance(b, str) else (0.0, 0.0, 0.0)
+    mine, theirs = _velocity(context, a), _velocity(context, b) if isinstance(b, str) else velocity
     here, there = (ResolvedPosition(_pose(context, target), _location(context, target)) for target in (a, b))
     if kind == "euclidianDistance":
         gap = math.dist(here.pose[:3], there.pose[:3])
@@ -219,18 +247,18 @@ def closing_speed(
     return 0.0 if abs(now) < EPSILON else sign * (after(-TIME_DELTA) - after(TIME_DELTA)) / (2.0 * TIME_DELTA)
 
 
-def _velocity(context: ConditionContext, name: str) -> tuple[float, float, float]:
+def _velocity(context: ConditionContext, name: str) -> Velocity:
     x, y, z = context.view.velocity[context.view.row(name)].tolist()
     return x, y, z
 
 
 def _moved(
-    context: ConditionContext, position: ResolvedPosition, velocity: tuple[float, float, float], duration: float
+    context: ConditionContext, position: ResolvedPosition, velocity: Velocity, duration: float
 ) -> ResolvedPosition:
     """Return the position after a duration [s] at this velocity."""
-    x, y = position.pose.x + velocity[0] * duration, position.pose.y + velocity[1] * duration
+    x, y, z = (now + rate * duration for now, rate in zip(position.pose[:3], velocity, strict=True))
     location = context.roads.locate_at(x, y, position.location) if context.roads is not None else None
-    return ResolvedPosition(position.pose._replace(x=x, y=y), location)
+    return ResolvedPosition(position.pose._replace(x=x, y=y, z=z), location)
 
 
 def _offsets(
