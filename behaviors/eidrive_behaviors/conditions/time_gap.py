@@ -62,6 +62,7 @@ class TimeToCollisionCondition(GapCondition):
             to,
             frame=self.frame,
             kind=self.kind,
+            freespace=self.element.freespace,
             algorithm=self.element.routing_algorithm,
             velocity=velocity,
         )

@@ -219,6 +219,7 @@ def closing_speed(
     *,
     frame: str,
     kind: str,
+    freespace: bool = False,
     algorithm: model.RoutingAlgorithm | None = None,
     velocity: Velocity = (0.0, 0.0, 0.0),
 ) -> float:
@@ -230,6 +231,14 @@ def closing_speed(
     mine, theirs = _velocity(context, a), _velocity(context, b) if isinstance(b, str) else velocity
     here, there = (ResolvedPosition(_pose(context, target), _location(context, target)) for target in (a, b))
     if kind == "euclidianDistance":
+
+        def space_after(duration: float) -> float:
+            other = b if isinstance(b, str) else _moved(context, b, theirs, duration)
+            return distance(MovedContext(context, duration), a, other, frame=frame, kind=kind, freespace=True)
+
+        if freespace and space_after(0.0) > 0.0:
+            # The nearest points of both boxes change while these pass each other
+            return (space_after(-TIME_DELTA) - space_after(TIME_DELTA)) / (2.0 * TIME_DELTA)
         gap = math.dist(here.pose[:3], there.pose[:3])
         axes = zip(here.pose[:3], there.pose[:3], mine, theirs, strict=True)
         return sum((b - a) * (v - w) for a, b, v, w in axes) / gap if gap > 0.0 else 0.0

@@ -296,6 +296,49 @@ def test_road_distance_in_bend_exceeds_euclidean_distance(context: Any, bend: An
     assert sight == pytest.approx(52.0, abs=1e-6)
 
 
+def view_of(*velocities: tuple[float, float], yaw_rate: float = 0.0) -> WorldView:
+    """Return a view of A and B with these velocities [m/s]; A has the yaw rate [rad/s]."""
+    zero, points = np.zeros(2), np.zeros((2, 3))
+    return WorldView(
+        time=0.0,
+        tick=0,
+        names=("A", "B"),
+        categories=("car", "car"),
+        position=points,
+        yaw=zero,
+        pitch=zero,
+        roll=zero,
+        velocity=np.array([(*velocity, 0.0) for velocity in velocities]),
+        acceleration=points,
+        yaw_rate=np.array([yaw_rate, 0.0]),
+        speed=np.array([math.hypot(*velocity) for velocity in velocities]),
+        size=points,
+        offset=points,
+    )
+
+
+@pytest.mark.parametrize(
+    ("x", "yaw_rate", "expected"),
+    [
+        (52.0, 0.0, 0.0),
+        (63.0, 0.0, 10.0 * 8.0 / math.hypot(8.0, 2.0)),
+        (63.0, 0.5, (8.0 * (10.0 + 0.5) - 2.0 * 4.0 * 0.5) / math.hypot(8.0, 2.0)),
+    ],
+)
+def test_closing_speed_of_free_space_is_that_of_the_boxes(
+    on_street: Any, x: float, yaw_rate: float, expected: float
+) -> None:
+    """A drives 20 m/s at x = 50, B 10 m/s in the lane to its right, 2 m beside A.
+
+    The box of A ends at x = 54, that of B begins 1 m behind its axle.
+    The front right corner of A is 4 m ahead of its axle and 1 m beside it: it turns forward and away from B.
+    """
+    on_street.add_actor("B", ResolvedPosition(Pose(x, -6.0, 0.0, 0.0, 0.0, 0.0)))
+    on_street.view = view_of((20.0, 0.0), (10.0, 0.0), yaw_rate=yaw_rate)
+    measured = partial(closing_speed, on_street, "A", frame="entity", kind="euclidianDistance", freespace=True)
+    assert measured("B") == pytest.approx(expected, abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("frame", "kind", "expected"),
     [
@@ -314,23 +357,7 @@ def test_closing_speed_in_bend_follows_the_measured_distance(
     for name, s in (("A", 0.0), ("B", 60.0)):
         here = bend.location("1", -1, s)
         made.add_actor(name, ResolvedPosition(bend.pose(here), here))
-    zero, points = np.zeros(2), np.zeros((2, 3))
-    made.view = WorldView(
-        time=0.0,
-        tick=0,
-        names=("A", "B"),
-        categories=("car", "car"),
-        position=points,
-        yaw=zero,
-        pitch=zero,
-        roll=zero,
-        velocity=np.array([[20.0, 0.0, 0.0], [8.0 * math.cos(1.2), 8.0 * math.sin(1.2), 0.0]]),
-        acceleration=points,
-        yaw_rate=zero,
-        speed=np.array([20.0, 8.0]),
-        size=points,
-        offset=points,
-    )
+    made.view = view_of((20.0, 0.0), (8.0 * math.cos(1.2), 8.0 * math.sin(1.2)))
     assert closing_speed(made, "A", "B", frame=frame, kind=kind) == pytest.approx(expected, abs=0.01)
 
 
@@ -343,14 +370,8 @@ def test_cars_in_one_lane_of_a_bend_have_no_lateral_closing_speed(context: Any, 
         poses = [bend.pose(place) for place in places]
         for name, pose, place in zip("AB", poses, places, strict=True):
             made.add_actor(name, ResolvedPosition(pose, place))
-        zeros, points = np.zeros(2), np.zeros((2, 3))
-        velocity = np.array(
-            [(speed * math.cos(p.h), speed * math.sin(p.h), 0.0) for p, speed in zip(poses, (20.0, 8.0), strict=True)]
-        )
-        made.view = WorldView(
-            0.0, 0, ("A", "B"), ("car", "car"), points, zeros, zeros, zeros, velocity, points, zeros,
-            np.array([20.0, 8.0]), points, points,
-        )  # fmt: skip
+        velocities = [(v * math.cos(p.h), v * math.sin(p.h)) for p, v in zip(poses, (20.0, 8.0), strict=True)]
+        made.view = view_of(*velocities)
         assert closing_speed(made, "A", "B", frame=frame, kind="lateral") == pytest.approx(0.0, abs=1e-6)
 
 
