@@ -11,7 +11,7 @@ from itertools import pairwise
 import pytest
 from opendrive_xml import lane_links_xml, lane_xml, map_xml, road_xml, section_xml, successor_xml
 from storyboard_xml import by_entity_xml, init_xml, lane_position_xml, private_xml, speed_xml, teleport_xml
-from street_scene import NOTHING
+from street_scene import NOTHING, OPENING
 from whole_run import Run
 
 
@@ -151,3 +151,27 @@ def test_relative_position_on_the_next_road_keeps_the_frame_of_its_reference(
     played = run(0.1, driven=False, others={"Other": (-1, 10.0, 0.0)}, street=head_to_head(), init=init)
     view = played.frames[0].view
     assert tuple(view.position[view.rows["Other"], :2]) == pytest.approx(expected)
+
+
+@pytest.mark.element("RelativeLanePosition")
+@pytest.mark.parametrize(
+    ("lane", "s", "offsets", "expected"),
+    [
+        (-1, 150.0, 'ds="120" dLane="0"', (270.0, -6.0)),
+        (-1, 150.0, 'ds="120" dLane="-1"', (270.0, -10.0)),
+        (-1, 150.0, 'dsLane="120" dLane="-1"', (270.0, -10.0)),
+        (-3, 300.0, 'ds="-150" dLane="0"', (150.0, -6.0)),
+        (-2, 300.0, 'ds="-150" dLane="-1"', (150.0, -6.0)),
+        (1, 300.0, 'ds="-150" dLane="0"', (150.0, 2.0)),
+    ],
+)
+def test_relative_position_in_the_next_lane_section_follows_lane_links(
+    run: Run, lane: int, s: float, offsets: str, expected: tuple[float, float]
+) -> None:
+    """Lanes -1 and -2 continue as -2 and -3 from s = 200 on."""
+    init = put("Ego", 1, lane, s) + init_xml(
+        "Other", teleport_xml(f'<RelativeLanePosition entityRef="Ego" {offsets}/>')
+    )
+    played = run(0.1, ("Ego", NOTHING), driven=False, others={"Other": (-1, 10.0, 0.0)}, street=OPENING, init=init)
+    row = played.frames[0].view.rows["Other"]
+    assert played.frames[0].view.position[row, :2].tolist() == pytest.approx(expected)

@@ -238,12 +238,10 @@ def relative_lane_position(frame: model.RelativeLanePosition, context: Condition
     roads, origin = roads_of(frame, context), road_origin(frame, context)
     route = context.actors[frame.entity_ref].motion.route
     ahead = facing(context, frame.entity_ref, origin)
-    if frame.ds_lane is not None:
-        axis = ahead
-        there = roads.advance(origin._replace(offset=0.0), frame.ds_lane * ahead, route=route)
-    else:
-        axis = roads.driving_direction(origin.road, origin.lane)
-        there = along_reference(roads, origin, frame.ds or 0.0, route)
+    by_road = frame.ds_lane is None
+    axis = roads.driving_direction(origin.road, origin.lane) if by_road else ahead
+    distance = ((frame.ds if by_road else frame.ds_lane) or 0.0) * axis
+    there = roads.advance(origin._replace(offset=0.0), distance, route=route, by_reference_line=by_road)
     if there is None:
         raise position_error(frame, f"beyond the end of the road of entity {frame.entity_ref!r}")
     sign = axis * roads.driving_direction(there.road, there.lane)
@@ -259,18 +257,17 @@ def relative_lane_position(frame: model.RelativeLanePosition, context: Condition
 def along_reference(
     roads: RoadNetwork, here: LaneLocation, ds: float, route: Route | None = None
 ) -> LaneLocation | None:
-    """Return the location at `ds` [m] along the reference line, in the same or the connected lane, at the same offset.
+    """Return the location at `ds` [m] along the reference line: at the same t of its road, or beyond it at the same
+    offset from the lane connected to that at its end.
 
-    The route selects the branch at junctions. A lane that ends before its road is replaced by the lane at the same t.
+    The route selects the branch at junctions.
     """
     road = roads.roads[here.road]
     s = here.s + ds
     if 0.0 <= s <= road.length:
         return here._replace(s=s)
     rest = s - road.length if s > road.length else s
-    edge = here._replace(s=road.length if s > road.length else 0.0)
-    if here.lane not in roads.lane_ids(here.road, edge.s):
-        edge = roads.road_location(here.road, edge.s, here.t)
+    edge = roads.road_location(here.road, road.length if s > road.length else 0.0, here.t)
     return roads.advance(
         edge, rest * roads.driving_direction(here.road, here.lane), route=route, by_reference_line=True
     )
