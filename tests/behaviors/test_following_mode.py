@@ -10,13 +10,13 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
-from eidrive_behaviors.actions.following import RateLimitedValue, speed_limiter
+from eidrive_behaviors.actions.following import PathPursuit, RateLimitedValue, speed_limiter
 from recorded_scene import RunScene
 from storyboard_xml import private_xml
 from trajectories import follow_points
 
-from eidrive_scenario.api.actions import model
-from eidrive_scenario.api.common import Placement
+from eidrive_scenario.api.actions import TrajectoryCurve, model
+from eidrive_scenario.api.common import Placement, Pose
 
 LARGEST_CURVATURE = math.tan(0.5) / 3.0
 
@@ -188,6 +188,19 @@ def test_vehicle_beside_the_curve_ahead_of_its_start_does_not_turn_back(scene: R
     played = scene(4, ("Ego", follow_points([(60.0, -2.0, None), (400.0, -2.0, None)], "follow")), dt=0.05)
     assert {row["Ego"].y for row in played.rows} == {-2.0}
     assert played.at(4).x == pytest.approx(180.0)
+
+
+@pytest.mark.parametrize(("y", "heading"), [(0.0, 0.0), (4.0, 0.0), (4.0, math.pi)])
+def test_vehicle_without_wheelbase_stands_and_then_joins_the_trajectory(y: float, heading: float) -> None:
+    """Its turning circle is a point, so that it turns toward the trajectory in the first step."""
+    ends = tuple(Pose(x, 0.0, 0.0, 0.0, 0.0, 0.0) for x in (0.0, 100.0))
+    start = Pose(10.0, y, 0.0, heading, 0.0, 0.0)
+    pursuit = PathPursuit(TrajectoryCurve((0.0, 100.0), ends, None), 10.0, start, math.inf, 0.0)
+    assert pursuit.advance(0.0, 0.1) == start
+    for _ in range(40):
+        pose = pursuit.advance(1.0, 0.1)
+    assert (pose.y, pose.h) == pytest.approx((0.0, 0.0), abs=1e-2)
+    assert pursuit.advance(0.0, 0.1) == pose
 
 
 @pytest.mark.parametrize("mode", ["position", "follow"])

@@ -136,8 +136,10 @@ class PathPursuit:
         With `tail_first` the vehicle faces against the trajectory.
         """
         way, sense = abs(ds), math.copysign(1.0, ds)
-        goal = self._goal(self.s + ds, tail_first)
-        if self.on_path and abs(wrap_angle(goal.h - self.pose.h)) <= self._curvature * way + TINY:
+        if way == 0.0:
+            return self.pose
+        goal, sharpest = self._goal(self.s + ds, tail_first), min(self._curvature, math.pi / way)
+        if self.on_path and abs(wrap_angle(goal.h - self.pose.h)) <= sharpest * way + TINY:
             self.s += ds
             self.pose = goal
             return goal
@@ -146,16 +148,16 @@ class PathPursuit:
         x, y, _, h, _, _ = self.pose
         h += back
         preview = max(self._wheelbase, PREVIEW * way / dt)
-        near = max(preview, 2.0 / self._curvature)
+        near = max(preview, 2.0 / sharpest)
         self._has_joined = self._has_joined or _distance(self._layout.at(self.s), x, y) <= near
-        curvature = self._curvature_to(self._layout.extended(self.s + sense * preview), h)
+        curvature = self._curvature_to(self._layout.extended(self.s + sense * preview), h, sharpest)
         middle, h = h + 0.5 * curvature * way, wrap_angle(h + curvature * way)
         x, y = x + way * math.cos(middle), y + way * math.sin(middle)
         h = wrap_angle(h - back)
         if self._has_joined or not self._is_beyond_end(x, y, near):
             self.s = self._project(x, y, ds)
         goal = self._goal(self.s, tail_first)
-        self.on_path = _distance(goal, x, y) < ON_PATH and abs(wrap_angle(goal.h - h)) <= self._curvature * way
+        self.on_path = _distance(goal, x, y) < ON_PATH and abs(wrap_angle(goal.h - h)) <= sharpest * way
         self.pose = goal if self.on_path else Pose(x, y, goal.z, h, goal.p, goal.r)
         return self.pose
 
@@ -170,14 +172,15 @@ class PathPursuit:
         back = pose.turned(math.pi)
         return back._replace(h=wrap_angle(back.h))
 
-    def _curvature_to(self, point: Pose, h: float) -> float:
-        """Return the curvature of the arc to a point for a vehicle that moves in direction `h` [1/m]."""
+    def _curvature_to(self, point: Pose, h: float, sharpest: float) -> float:
+        """Return the curvature of the arc to a point for a vehicle that moves in direction `h` [1/m]; at most
+        `sharpest`."""
         dx, dy = point.x - self.pose.x, point.y - self.pose.y
         ahead = math.cos(h) * dx + math.sin(h) * dy
         left = math.cos(h) * dy - math.sin(h) * dx
         if ahead <= 0.0:
-            return math.copysign(self._curvature, left)
-        return min(max(2.0 * left / (dx * dx + dy * dy), -self._curvature), self._curvature)
+            return math.copysign(sharpest, left)
+        return min(max(2.0 * left / (dx * dx + dy * dy), -sharpest), sharpest)
 
     def _beside(self, x: float, y: float) -> float:
         """Return the first arc length from `s` on at which the trajectory is beside a position [m].
