@@ -39,6 +39,16 @@ def test_busy_ratio_ignores_signals_below_the_threshold() -> None:
     assert (carrier.channel_busy_ratio("B") or 0.0) == pytest.approx(0.0025, rel=0.1)
 
 
+@pytest.mark.parametrize(("threshold", "ratio", "interval"), [(-101.1, 1.0, 1.0), (-100.9, 0.0025, 0.1)])
+def test_busy_ratio_with_threshold_below_noise_is_one(threshold: float, ratio: float, interval: float) -> None:
+    """S-RSSI includes the noise (TS 36.214): -95 dBm in 10 MHz, -101.02 dBm in one of four subchannels."""
+    carrier = radio(1, **MODE_4, sidelink={"cbr_threshold_dbm": threshold}, congestion={"kind": "reactive"})
+    exchange(carrier, TWO, 100, sizes=(190,), dt=0.1)
+    for name in TWO:
+        assert carrier.channel_busy_ratio(name) == pytest.approx(ratio, rel=0.1)
+        assert carrier.min_message_interval(name) == interval
+
+
 def test_busy_ratio_of_a_single_station_is_zero() -> None:
     carrier = radio(1, **MODE_4)
     for tick in range(100):

@@ -83,6 +83,7 @@ class Sidelink(MediumAccess):
         noise = 10.0 ** (noise_dbm / 10.0)
         self._block_noise = noise / settings.noise_blocks
         self._busy_above = 10.0 ** (settings.cbr_threshold_dbm / 10.0) - noise / settings.noise_subchannels
+        """Received power above which a subchannel is busy [mW]; if negative, the noise alone exceeds the threshold."""
         self._slot = settings.slot
         self._interval = round(settings.interval / settings.slot)
         self._window = round(settings.window / settings.slot)
@@ -130,6 +131,8 @@ class Sidelink(MediumAccess):
 
     def channel_busy_ratio(self, row: int, span: float) -> float:
         """Return the channel busy ratio of a station: mean over all subchannels of the measured slots."""
+        if self._busy_above < 0.0:
+            return 1.0
         measured = span - float(self._unmeasured_time[row] + self._period_unmeasured[row])
         return super().channel_busy_ratio(row, measured) if measured > 0.0 else 0.0
 
@@ -308,7 +311,9 @@ class Sidelink(MediumAccess):
     def _period_ratio(self, period: float) -> Array:
         measured = period - self._period_unmeasured
         ratio: Array = np.where(
-            measured > TIME_TOLERANCE, self._period_busy / np.maximum(measured, TIME_TOLERANCE), 1.0
+            (measured > TIME_TOLERANCE) & (self._busy_above >= 0.0),
+            self._period_busy / np.maximum(measured, TIME_TOLERANCE),
+            1.0,
         )
         self._unmeasured_time += self._period_unmeasured
         self._period_unmeasured = np.zeros(len(self.names))
