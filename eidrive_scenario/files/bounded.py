@@ -133,7 +133,7 @@ def load_json(data: bytes, max_values: int = MAX_VALUES, *, max_depth: int | Non
     """
     check_values(data, max_values)
     try:
-        document = json.loads(data.decode())
+        document = json.loads(data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise ValueError(f"the document is not UTF-8 (byte {error.start})") from None
     except RecursionError:

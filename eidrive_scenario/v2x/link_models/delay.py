@@ -80,7 +80,7 @@ def _column(path: Path, column: object) -> list[float]:
     if not isinstance(column, str | int) or isinstance(column, bool):
         raise ValueError(f"column is invalid (got {quoted(column)}; expected a name or an index from 0)")
     try:
-        text = read_regular_file(path, MAX_BYTES).decode("utf-8")
+        text = read_regular_file(path, MAX_BYTES).decode("utf-8-sig")
         reader = csv.reader(text.splitlines(keepends=True))
         rows = [(reader.line_num, row) for row in reader if row]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
@@ -103,7 +103,7 @@ def _column(path: Path, column: object) -> list[float]:
     values = []
     for number, row in body:
         # The row is not quoted: the path may refer to a file with other, confidential content.
-        if index >= len(row) or not _is_number(row[index]):
+        if index >= len(row) or not _is_number(row[index]) or not math.isfinite(float(row[index])):
             raise ValueError(f"{name}:{number}: column {index} is not a delay")
         if float(row[index]) < 0.0:
             raise ValueError(f"{name}:{number}: delay is negative")
@@ -113,9 +113,10 @@ def _column(path: Path, column: object) -> list[float]:
 
 def _is_number(text: str) -> bool:
     try:
-        return math.isfinite(float(text))
+        float(text)
     except ValueError:
         return False
+    return True
 
 
 class ConstantDelay(Settings):

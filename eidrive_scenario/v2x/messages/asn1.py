@@ -64,7 +64,7 @@ class Asn1Encoder:
                 message = f"no ASN.1 module {quoted(str(file))}"
                 raise SettingError(Diagnostic(message, "expected the path of a file", source, line))
         try:
-            texts = [read_regular_file(file, MAX_BYTES).decode("utf-8", errors="replace") for file in files]
+            texts = [read_regular_file(file, MAX_BYTES).decode("utf-8-sig", errors="replace") for file in files]
             self._modules = asn1tools.compile_string("\n".join(texts), "uper")
         except OSError as error:
             message = f"ASN.1 module {error.filename} cannot be read: {reason_of(error)}"

@@ -42,6 +42,14 @@ def test_encoder_writes_cpm_objects_in_the_frame_of_the_sender() -> None:
     assert first["xSpeed"]["value"] == 300
 
 
+def test_modules_with_byte_order_mark_are_those_without(tmp_path: Path) -> None:
+    marked = tmp_path / "marked.asn1"
+    marked.write_text(TINY.read_text(encoding="utf-8"), encoding="utf-8-sig")
+    assert Asn1Encoder([marked], ["cpm"]).encode(message("cpm", 2)) == Asn1Encoder([TINY], ["cpm"]).encode(
+        message("cpm", 2)
+    )
+
+
 def test_encoder_writes_cam_with_position_and_speed_of_the_sender() -> None:
     encoder = Asn1Encoder([TINY], ["cam"])
     short, long = (encoder.encode(message("cam", 1), low_frequency=low) for low in (False, True))

@@ -172,6 +172,17 @@ def test_trace_delay_from_a_file_is_relative_to_the_profile(tmp_path: Path) -> N
     assert bare.seconds == (0.5, 0.25)
 
 
+@pytest.mark.parametrize(
+    ("text", "column"), [("0.5\n0.25\n", 0), ("late\n0.5\n0.25\n", "late"), ('"late"\n0.5\n0.25\n', 0)]
+)
+def test_trace_delay_from_a_file_with_byte_order_mark_has_all_values(
+    tmp_path: Path, text: str, column: int | str
+) -> None:
+    (tmp_path / "marked.csv").write_text(text, encoding="utf-8-sig")
+    delay = TraceDelay.model_validate({"kind": "trace", "file": str(tmp_path / "marked.csv"), "column": column})
+    assert delay.seconds == (0.5, 0.25)
+
+
 INVALID = [
     ({"kind": "gilbert_elliott"}, "either to_bad and to_good, or probability and burst are expected"),
     ({"kind": "gilbert_elliott", "to_bad": 0.1, "to_good": 0.1, "burst": 3}, "either to_bad and to_good"),
@@ -200,6 +211,8 @@ def test_loss_settings_invalid_raise_with_expected_value(settings: dict[str, obj
         ("a\n1\nx\n", {}, ":3: column 0 is not a delay"),
         ("a\n1\n", {"column": 4}, r"has no column 4 \(expected 0 to 0\)"),
         ("-1\n", {}, ":1: delay is negative"),
+        ("nan\n1\n", {}, ":1: column 0 is not a delay"),
+        ("0,inf\n1,1\n", {"column": 1}, ":1: column 1 is not a delay"),
         ("1\n", {"seconds": [1.0]}, "either seconds or file is expected"),
     ],
 )
