@@ -129,11 +129,19 @@ def _trajectory(frame: model.TrajectoryPosition, context: ConditionContext, acto
 def trajectory_of(
     frame: model.TrajectoryPosition, context: ConditionContext, actor: str | None = None
 ) -> TrajectoryCurve:
-    """Return the trajectory of a position, with its points resolved at this instant."""
+    """Return the trajectory of a position, with its points resolved at this instant.
+
+    Raise ScenarioError if the position is outside of it.
+    """
     trajectory = _trajectory_element(frame, context)
-    return sample_trajectory(
+    layout = sample_trajectory(
         trajectory, lambda position: resolve_position(position, context, actor).pose, roads=context.roads
     )
+    if not -1e-3 <= frame.s <= layout.length + 1e-3:
+        raise position_error(
+            frame, "s is outside of the trajectory", f"got {frame.s:g} m; expected 0 to {layout.length:.1f} m"
+        )
+    return layout
 
 
 def _route_element(frame: model.RoutePosition, context: ConditionContext) -> model.Route:

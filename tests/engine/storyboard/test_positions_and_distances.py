@@ -175,16 +175,30 @@ def test_route_position_is_searched_once_unless_it_refers_to_an_entity(
     assert (resolve_position(position, on_street) is resolve_position(position, on_street)) is is_static
 
 
-@pytest.mark.element("TrajectoryPosition")
-def test_trajectory_position_has_s_and_t_of_the_trajectory(on_street: Any) -> None:
+def on_trajectory(s: float, *, closed: bool = False) -> model.Position:
+    """Return a position 2 m to the left of a line of 40 m along y."""
     corners = tuple(
         model.Vertex(position=model.Position(world_position=model.WorldPosition(x=x, y=y)))
         for x, y in ((0, 50), (0, 90))
     )
-    way = model.Trajectory(closed=False, name="way", shape=model.Shape(polyline=model.Polyline(vertex=corners)))
-    frame = model.TrajectoryPosition(s=10, t=2, trajectory_ref=model.TrajectoryRef(trajectory=way))
-    pose = resolve_position(model.Position(trajectory_position=frame), on_street).pose
-    assert (pose.x, pose.y, pose.h) == pytest.approx((-2.0, 60.0, math.pi / 2))
+    way = model.Trajectory(closed=closed, name="way", shape=model.Shape(polyline=model.Polyline(vertex=corners)))
+    frame = model.TrajectoryPosition(s=s, t=2, trajectory_ref=model.TrajectoryRef(trajectory=way))
+    return model.Position(trajectory_position=frame)
+
+
+@pytest.mark.element("TrajectoryPosition")
+@pytest.mark.parametrize("s", [0.0, 10.0, 40.0005])
+def test_trajectory_position_has_s_and_t_of_the_trajectory(on_street: Any, s: float) -> None:
+    pose = resolve_position(on_trajectory(s), on_street).pose
+    assert (pose.x, pose.y, pose.h) == pytest.approx((-2.0, 50.0 + s, math.pi / 2), abs=1e-3)
+
+
+@pytest.mark.parametrize(("s", "closed"), [(40.01, False), (-0.01, False), (80.01, True), (-5.0, True)])
+def test_trajectory_position_outside_of_its_trajectory_is_rejected(on_street: Any, s: float, closed: bool) -> None:
+    """A line back to the start closes the trajectory of 80 m."""
+    end = 80.0 if closed else 40.0
+    with pytest.raises(ScenarioError, match=rf"s is outside of the trajectory.*got {s:g} m; expected 0 to {end:.1f} m"):
+        resolve_position(on_trajectory(s, closed=closed), on_street)
 
 
 @pytest.mark.parametrize(
