@@ -190,6 +190,18 @@ def test_vehicle_beside_the_curve_ahead_of_its_start_does_not_turn_back(scene: R
     assert played.at(4).x == pytest.approx(180.0)
 
 
+@pytest.mark.parametrize("length", [100.0, 1e8])
+def test_vehicle_beside_a_trajectory_of_any_length_begins_there(length: float) -> None:
+    """It turns left by 90° 20 m before its end; the vehicle is 10 m before this corner, or 5 m before the end."""
+    corner = length - 20.0
+    points = ((0.0, 0.0, 0.0), (corner, 0.0, 0.5 * math.pi), (corner, 20.0, 0.5 * math.pi))
+    poses = tuple(Pose(x, y, 0.0, h, 0.0, 0.0) for x, y, h in points)
+    layout = TrajectoryCurve((0.0, corner, length), poses, None)
+    for x, y, expected in ((corner - 10.0, -4.0, corner - 10.0), (corner + 4.0, 15.0, length - 5.0)):
+        pursuit = PathPursuit(layout, 0.0, Pose(x, y, 0.0, 0.0, 0.0, 0.0), LARGEST_CURVATURE, 3.0)
+        assert pursuit.s == pytest.approx(expected, abs=1e-3)
+
+
 @pytest.mark.parametrize(("y", "heading"), [(0.0, 0.0), (4.0, 0.0), (4.0, math.pi)])
 def test_vehicle_without_wheelbase_stands_and_then_joins_the_trajectory(y: float, heading: float) -> None:
     """Its turning circle is a point, so that it turns toward the trajectory in the first step."""

@@ -10,6 +10,7 @@ Other requirements of actions are checked here, too: reference entities, and eff
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 
 from eidrive_scenario.api.actions import ActionBehaviour, EntityAbsentError, TrajectoryCurve, model, turning_wheelbase
 from eidrive_scenario.api.common import Pose, wrap_angle
@@ -56,7 +57,7 @@ ON_PATH = 1e-3
 PREVIEW = 0.5
 """Preview time of a vehicle that is off its trajectory [s]."""
 SEARCH_STEP = 1.0
-"""Maximum step of the search for the place of a vehicle along its trajectory [m]."""
+"""Maximum step over several segments of the search for the place of a vehicle along its trajectory [m]."""
 
 
 class RateLimitedValue:
@@ -193,7 +194,8 @@ class PathPursuit:
             ahead = math.cos(tangent) * (x - point.x) + math.sin(tangent) * (y - point.y)
             if ahead <= ON_PATH:
                 return s
-            s += min(ahead, SEARCH_STEP)
+            # A straight segment ends, or is beside the position, in one step
+            s += min(ahead, max(SEARCH_STEP, layout.s[bisect_right(layout.s, s)] - s))
         return self.s
 
     def _is_beyond_end(self, x: float, y: float, near: float) -> bool:
