@@ -167,7 +167,7 @@ class CatalogLibrary:
             raise ScenarioError([*self._collector.errors, diagnostic]) from error
         reader = Reader(catalog.document.name, catalog.version, self._collector, catalog.document.read)
         lent = Scope(parameters=dict(self._parameters), lent=set(), budget=self._collector.budget)
-        entry = reader.read(node, rule.cls, _assignments(reference), lent)
+        entry = reader.read(node, rule.cls, _assignments(reference, self._collector), lent)
         for parameter in sorted(lent.lent or ()):
             message = f"catalog entry {quoted(name)} uses the parameter {quoted(parameter)} of the scenario"
             hint = "declare it in the entry, and assign it in the CatalogReference"
@@ -292,13 +292,16 @@ def _missing_catalog(name: str, locations: Iterable[Path], names: set[str]) -> t
     return message, suggestion(name, names)
 
 
-def _assignments(reference: model.CatalogReference) -> dict[str, Assignment]:
+def _assignments(reference: model.CatalogReference, collector: DiagnosticCollector) -> dict[str, Assignment]:
+    assigned: dict[str, Assignment] = {}
     assignments = reference.parameter_assignments
-    return {
-        assignment.parameter_ref: Assignment(assignment.value, Location.of(assignment))
-        for assignment in (assignments.parameter_assignment if assignments else ())
-        if isinstance(assignment.parameter_ref, str) and isinstance(assignment.value, str)
-    }
+    for assignment in assignments.parameter_assignment if assignments else ():
+        name, value = assignment.parameter_ref, assignment.value
+        if isinstance(name, str) and isinstance(value, str):
+            if name in assigned:
+                collector.error(f"CatalogReference assigns {quoted(name)} twice", "remove one", at=assignment)
+            assigned[name] = Assignment(value, Location.of(assignment))
+    return assigned
 
 
 def _candidates(locations: Iterable[Path], name: str) -> Iterator[Path]:

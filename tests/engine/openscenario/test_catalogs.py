@@ -67,6 +67,17 @@ def test_catalog_entry_uses_assigned_values(write_catalog: Write, write_scenario
     assert properties_of(assigned.controllers["Ego"][0])["model"] == "wild"
 
 
+def test_catalog_reference_that_assigns_a_parameter_twice_is_an_error(
+    write_catalog: Write, write_scenario: Write
+) -> None:
+    write_catalog("Drivers.xosc", "Drivers", CONTROLLER.format(limit=3))
+    once = '<ParameterAssignment parameterRef="Model" value="wild"/>'
+    twice = reference("Drivers", "driver", Model="wild").replace(once, f"{once}\n{once}")
+    with pytest.raises(ScenarioError, match=r"CatalogReference assigns 'Model' twice.*remove one") as caught:
+        load_scenario(write_scenario(twice))
+    assert len(caught.value.diagnostics) == 1
+
+
 def test_catalog_reference_remains_in_the_model(write_catalog: Write, write_scenario: Write) -> None:
     catalog = write_catalog("Drivers.xosc", "Drivers", CONTROLLER.format(limit=3))
     scenario = load_scenario(write_scenario(reference("Drivers", "driver")))
