@@ -76,6 +76,10 @@ class Diagnostic:
 class EidriveError(Exception):
     """Base class of all exceptions of this package."""
 
+    def as_json(self) -> dict[str, Any]:
+        """Return the JSON object that `--json` prints for a run that was aborted by this error."""
+        return {"kind": "run", "message": str(self)}
+
 
 class InputError(EidriveError):
     """Invalid user input. `diagnostics` holds all diagnostics in the order of the file."""
@@ -127,10 +131,6 @@ class RegistryError(EidriveError):
 
 class SimulationError(EidriveError):
     """Run that was aborted by an internal error."""
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the JSON object that `--json` prints for a run that was aborted by this error."""
-        return {"kind": "run", "message": str(self)}
 
 
 @dataclass(frozen=True)

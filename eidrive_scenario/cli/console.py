@@ -29,7 +29,7 @@ from eidrive_scenario.storyboard.tree.elements import StoryElement
 from eidrive_scenario.storyboard.tree.events import ActionElement
 
 if TYPE_CHECKING:
-    from eidrive_scenario.experiments.judgement import Judgement
+    from eidrive_scenario.experiments.judgement import FailedJudgement, Judgement
 
 
 _OUTCOMES = {
@@ -106,21 +106,30 @@ def show_judgement(judgement: Judgement) -> None:
     print_warnings(judgement.warnings)
 
 
-def show_judgements(judgements: Sequence[Judgement]) -> None:
+def show_judgements(judgements: Sequence[Judgement | FailedJudgement]) -> None:
     """Print the verdicts on several recordings as a table with a column of each criterion, and counts of outcomes."""
+    from eidrive_scenario.experiments.judgement import Judgement
+
     out = console()
-    names = list(dict.fromkeys(verdict.name for judgement in judgements for verdict in judgement.criteria))
+    complete = [judgement for judgement in judgements if isinstance(judgement, Judgement)]
+    names = list(dict.fromkeys(verdict.name for judgement in complete for verdict in judgement.criteria))
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for heading in ("recording", "scenario", "seed", "", *names):
         table.add_column(Text(heading), no_wrap=heading == "seed")
+    outcomes = []
     for judgement in judgements:
-        cells = {verdict.name: Text.assemble(_mark(verdict), _value_of(verdict)) for verdict in judgement.criteria}
         path = judgement.recording
-        folder = path.parent if path.name == RECORDING else path
-        run = (Text(str(folder)), Text(judgement.scenario), str(judgement.seed), _outcome_of(judgement))
-        table.add_row(*run, *(cells.get(name, "") for name in names))
+        folder = Text(str(path.parent if path.name == RECORDING else path))
+        if isinstance(judgement, Judgement):
+            outcomes.append(_outcome_of(judgement))
+            cells = {verdict.name: Text.assemble(_mark(verdict), _value_of(verdict)) for verdict in judgement.criteria}
+            run = (folder, Text(judgement.scenario), str(judgement.seed), outcomes[-1])
+            table.add_row(*run, *(cells.get(name, "") for name in names))
+        else:
+            outcomes.append(Text("aborted" if judgement.exit_code == ABORTED else "invalid input", "bold red"))
+            table.add_row(folder, "", "", outcomes[-1])
     out.print(table)
-    counts = Counter(_outcome_of(judgement).plain for judgement in judgements)
+    counts = Counter(outcome.plain for outcome in outcomes)
     out.print(f"{len(judgements)} recordings: {', '.join(f'{count} {word}' for word, count in counts.items())}")
 
 

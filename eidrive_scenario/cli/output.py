@@ -131,10 +131,11 @@ def _restate_choice(error: BaseException) -> None:
 
 
 def print_error(error: BaseException, what: str = "run", file: object = None) -> None:
-    """Print an error on stderr: an aborted run or check, an error of the operating system, or an internal error.
+    """Print an error on stderr: an aborted run, check or judgement, an error of the operating system, or an internal
+    error.
 
-    what  run or check; omitted from the message of an error outside of both, such as an extension that does not load
-    file  file whose check was aborted; None for a run
+    what  run, check or judgement; omitted from the message of an error outside, such as an extension that does not load
+    file  file whose check or judgement was aborted; None for a run
     """
     prefix = f"{file}: " if file is not None else ""
     error = _attribute(error)

@@ -9,11 +9,19 @@ from typing import Annotated, Literal
 import typer
 
 from eidrive_scenario.cli.options import check_output_paths
-from eidrive_scenario.cli.output import echo, echo_path, has_all_characters, print_warnings
-from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.cli.output import (
+    echo,
+    echo_path,
+    has_all_characters,
+    print_error,
+    print_warnings,
+    show_traceback,
+)
+from eidrive_scenario.errors import Diagnostic, EidriveError, InputError, SettingError
 
 
 def judge(
+    context: typer.Context,
     recordings: Annotated[
         list[Path], typer.Argument(metavar="RECORDING", help="A recording.mcap, or a folder of one or several runs.")
     ],
@@ -32,23 +40,36 @@ def judge(
 
     Exit codes as for eidrive run, of several runs the highest; 3 also for an incomplete or damaged recording.
     """
-    from eidrive_scenario.experiments.judgement import judge_recording
+    from eidrive_scenario.experiments.judgement import FailedJudgement, Judgement, judge_recording
     from eidrive_scenario.experiments.single_run import as_json_text
     from eidrive_scenario.recording.run_files import recordings_in
 
     paths = [path for location in recordings for path in recordings_in(location)]
-    judgements = []
+    judgements: list[Judgement | FailedJudgement] = []
     for path in paths:
-        judgement = judge_recording(path, criterion or None)
+        judgement: Judgement | FailedJudgement
+        try:
+            judgement = judge_recording(path, criterion or None)
+        except EidriveError as error:
+            if len(paths) == 1:
+                raise
+            judgement = FailedJudgement(path, error)
+            if isinstance(error, InputError):
+                for diagnostic in error.at(str(path)).diagnostics:
+                    echo(str(diagnostic), err=True)
+            elif context.find_root().params.get("traceback"):
+                show_traceback(error)
+            else:
+                print_error(error, "judgement", path)
         judgements.append(judgement)
         if json:
             echo(as_json_text(judgement, ascii_only=not has_all_characters()))
-        if json or len(paths) > 1:
+        if isinstance(judgement, Judgement) and (json or len(paths) > 1):
             print_warnings(f"{path}: {warning}" if len(paths) > 1 else warning for warning in judgement.warnings)
     if not json:
         from eidrive_scenario.cli.console import show_judgement, show_judgements
 
-        if len(judgements) == 1:
+        if len(judgements) == 1 and isinstance(judgements[0], Judgement):
             show_judgement(judgements[0])
         else:
             show_judgements(judgements)

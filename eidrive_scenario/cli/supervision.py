@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import typer
 
 from eidrive_scenario.cli.output import echo, has_all_characters, print_error, show_traceback
-from eidrive_scenario.errors import ABORTED, EidriveError, SimulationError, WallLimitError
+from eidrive_scenario.errors import ABORTED, EidriveError, WallLimitError
 
 if TYPE_CHECKING:
     from eidrive_scenario.base.wall_limit import Limit
@@ -145,13 +145,12 @@ class RunFailures:
         """Print the JSON object of the run if `--json` is set."""
         if not self._json:
             return
-        description = error.as_json() if isinstance(error, SimulationError) else {"kind": "run", "message": str(error)}
         entry = {
             "scenario": self._scenario,
             **self.subject,
             "passed": False,
             "end_reason": "error",
-            "error": description,
+            "error": error.as_json(),
         }
         if notes := getattr(error, "__notes__", None):
             entry["notes"] = notes

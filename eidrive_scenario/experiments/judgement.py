@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from eidrive_scenario.errors import ABORTED, PASSED, Diagnostic, EidriveError, SettingError
+from eidrive_scenario.errors import ABORTED, INVALID_INPUT, PASSED, Diagnostic, EidriveError, InputError, SettingError
 from eidrive_scenario.evaluation.criteria_parser import (
     CRITERION,
     EXITS,
@@ -80,6 +80,24 @@ class Judgement:
         }
 
 
+@dataclass(frozen=True)
+class FailedJudgement:
+    """Recording that `judge_recording` cannot judge, and its error."""
+
+    recording: Path
+    error: EidriveError
+
+    @property
+    def exit_code(self) -> int:
+        """Exit code of the error: 2 for invalid input, 3 for a fault of a criterion."""
+        return INVALID_INPUT if isinstance(self.error, InputError) else ABORTED
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the object that `eidrive judge --json` prints, with the keys of that of an aborted run."""
+        error = self.error.as_json()
+        return {"passed": False, "end_reason": "error", "error": error, "recording": str(self.recording)}
+
+
 def judge_recording(location: str | os.PathLike[str], criteria: Any = None) -> Judgement:
     """Judge a recorded run, given as its recording or the folder of the run.
 
@@ -93,7 +111,7 @@ def judge_recording(location: str | os.PathLike[str], criteria: Any = None) -> J
         return _judge(open_recording(recording_in(path_argument(location, "location"))), criteria)
     except EidriveError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         report_extension(error)
         raise
 

@@ -30,7 +30,7 @@ from eidrive_scenario.simulation import Observer, RunResult, Simulation
 from eidrive_scenario.simulation.observers import checked_observers
 
 if TYPE_CHECKING:
-    from eidrive_scenario.experiments.judgement import Judgement
+    from eidrive_scenario.experiments.judgement import FailedJudgement, Judgement
     from eidrive_scenario.recording.text.explanation import Explanation
 
 
@@ -185,7 +185,9 @@ def _keep(result: RunResult, folder: RunFolder, record: RecordMode) -> RunResult
     return replace(result, warnings=warnings, folder=folder.path, recording=recording)
 
 
-def as_json_text(result: RunResult | Judgement, indent: int | None = None, *, ascii_only: bool = False) -> str:
+def as_json_text(
+    result: RunResult | Judgement | FailedJudgement, indent: int | None = None, *, ascii_only: bool = False
+) -> str:
     """Return a result or judgement as JSON, with null for non-finite numbers.
 
     ascii_only  whether other letters are escaped: `\\u00e4`

@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 from command_fixtures import Eidrive
 
+from eidrive_scenario.errors import ExtensionError, ExtensionPlace
+from eidrive_scenario.experiments import judgement
+
 
 @pytest.mark.parametrize(("other_y", "code"), [("5", 0), ("0", 1)])
 def test_judge_prints_criteria_of_run_with_its_exit_code(
@@ -37,6 +40,43 @@ def test_judge_of_several_recordings_prints_one_table(eidrive: Eidrive, passing_
         assert summary == "2 recordings: 1 failed, 1 passed"
     objects = map(json.loads, eidrive("judge", *folders, "--json").stdout.splitlines())
     assert [judgement["passed"] for judgement in objects] == [True, False]
+
+
+def test_judge_of_several_recordings_reports_those_that_it_cannot_judge(
+    eidrive: Eidrive, passing_by: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One of three is no recording, and a criterion raises an exception for another; the exit code is the highest."""
+    for name in "abc":
+        eidrive("run", passing_by, "--out", tmp_path / name)
+    aborted, bad, good = (path for name in "abc" for path in (tmp_path / name).rglob("recording.mcap"))
+    bad.write_bytes(b"not a recording")
+
+    def judge_with_fault(path: Path, criteria: object) -> judgement.Judgement:
+        if path == aborted:
+            raise ExtensionError(ExtensionPlace("criterion", "gap", "gaps:Gap"), "ValueError: no gap")
+        return judge_recording(path, criteria)
+
+    judge_recording = judgement.judge_recording
+    monkeypatch.setattr(judgement, "judge_recording", judge_with_fault)
+    judged = eidrive("judge", tmp_path)
+    heading, *lines, summary = judged.stdout.splitlines()
+    assert [line.split()[:3] for line in lines[:2]] == [
+        [str(aborted.parent), "aborted"],
+        [str(bad.parent), "invalid", "input"],
+    ]
+    assert (lines[2].startswith(str(good.parent)), "min_distance" in heading) == (True, True)
+    assert (summary, judged.exit_code) == ("3 recordings: 1 aborted, 1 invalid input, 1 passed", 3)
+    assert f"{aborted}: judgement aborted: criterion 'gap' (gaps:Gap): ValueError: no gap" in judged.stderr
+    assert f"{bad}: not an MCAP file" in judged.stderr
+    objects = [json.loads(line) for line in eidrive("judge", tmp_path, "--json").stdout.splitlines()]
+    assert [(entry["recording"], entry["passed"]) for entry in objects] == [
+        (str(aborted), False),
+        (str(bad), False),
+        (str(good), True),
+    ]
+    assert objects[0]["error"]["problem"] == "ValueError: no gap"
+    assert "not an MCAP file" in objects[1]["error"]["message"]
+    assert eidrive("judge", aborted.parent).exit_code == 3
 
 
 def test_judged_scenario_has_the_name_of_its_run(eidrive: Eidrive, tmp_path: Path) -> None:
