@@ -15,7 +15,7 @@ from urllib.parse import quote
 from pydantic import ValidationError
 
 from eidrive_scenario.driving.settings import AgentSettings
-from eidrive_scenario.errors import Diagnostic, InputError
+from eidrive_scenario.errors import Diagnostic, InputError, counted
 from eidrive_scenario.experiments.reported_run import ReportedRun
 from eidrive_scenario.files.bounded import load_json, path_argument
 from eidrive_scenario.recording.camera_images import pictures_in
@@ -33,6 +33,7 @@ from eidrive_scenario.reporting.replay.light import LightChanges, parse_weather
 from eidrive_scenario.reporting.replay.models import ActorModels, street_models, three_library
 from eidrive_scenario.reporting.replay.series import closest_approach
 from eidrive_scenario.reporting.run_report.reported_runs import run_of_recording
+from eidrive_scenario.reporting.run_report.run_groups import run_key
 from eidrive_scenario.reporting.run_report.settings_text import run_facts, shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS
 from eidrive_scenario.roads import RoadNetwork
@@ -341,22 +342,28 @@ MOST = 200
 
 
 def write_replays(runs: Sequence[ReportedRun], beside: str | os.PathLike[str]) -> tuple[list[ReportedRun], list[str]]:
-    """Write the replay of each run with a recording into a folder `beside` the report.
+    """Write the replay of each run with a recording into a folder `beside` the report, one for all copies of a run.
 
     Return the runs with the addresses of their replays, and the reasons for which recordings have none.
     """
     folder = path_argument(beside, "beside") / FOLDER
-    linked = list(runs)
+    addresses: dict[object, str] = {}
     omitted: list[str] = []
     taken: set[str] = set()
+    left: set[object] = set()
     recordings = [
-        (index, run.folder / RECORDING)
+        (run_key(run, index), run.folder / RECORDING)
         for index, run in sorted(enumerate(runs), key=lambda entry: entry[1].passed)
         if run.folder is not None and (run.folder / RECORDING).is_file()
     ]
     if recordings:
         write_page(folder / LIBRARY, "replay/library.js.jinja", three=three_library())
-    for index, recording in recordings[:MOST]:
+    for key, recording in recordings:
+        if key in addresses:
+            continue
+        if len(addresses) == MOST:
+            left.add(key)
+            continue
         name = recording.parent.name
         while name in taken:
             name += "-"
@@ -367,7 +374,12 @@ def write_replays(runs: Sequence[ReportedRun], beside: str | os.PathLike[str]) -
         except InputError as error:
             omitted.append(f"{recording}: {error.diagnostics[0].message}; the run has no replay")
             continue
-        linked[index] = runs[index].model_copy(update={"replay": f"{FOLDER}/{quote(os.fsencode(page.name))}"})
-    if len(recordings) > MOST:
-        omitted.append(f"{len(recordings) - MOST} passed or later runs have no replay: `eidrive view` writes it")
+        addresses[key] = f"{FOLDER}/{quote(os.fsencode(page.name))}"
+    if left:
+        runs_left = counted(len(left), "passed or later run has", "passed or later runs have")
+        omitted.append(f"{runs_left} no replay: `eidrive view` writes it")
+    linked = [
+        run.model_copy(update={"replay": address}) if (address := addresses.get(run_key(run, index))) else run
+        for index, run in enumerate(runs)
+    ]
     return linked, omitted

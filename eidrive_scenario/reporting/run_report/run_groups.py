@@ -59,6 +59,11 @@ class RunGroup:
         )
 
 
+def run_key(run: ReportedRun, index: int) -> object:
+    """Return a key that copies of a run have in common: its index if its settings are unknown."""
+    return (run.settings_sha256, run.trace_hash) if run.settings_sha256 else index
+
+
 def distinct_runs(runs: Sequence[ReportedRun]) -> list[ReportedRun]:
     """Return runs each once, whether it is in several folders or in the store and the folder of a sweep.
 
@@ -66,7 +71,7 @@ def distinct_runs(runs: Sequence[ReportedRun]) -> list[ReportedRun]:
     """
     distinct: dict[object, ReportedRun] = {}
     for index, run in enumerate(runs):
-        key = (run.settings_sha256, run.trace_hash) if run.settings_sha256 else index
+        key = run_key(run, index)
         kept = distinct.setdefault(key, run)
         if (run.is_swept, bool(run.replay)) > (kept.is_swept, bool(kept.replay)):
             distinct[key] = run if run.replay else run.model_copy(update={"replay": kept.replay})

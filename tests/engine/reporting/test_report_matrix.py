@@ -40,11 +40,13 @@ def run(scenario: str, channel: str, seed: int, passed: bool, **parameters: str)
     return parse_run(result)
 
 
-def stored_run(folder: Path, name: str, frames: list[Frame] | None, *, passed: bool = True) -> Path:
-    """Write the files of a run; without frames it has no recording."""
+def stored_run(folder: Path, name: str, frames: list[Frame] | None, *, passed: bool = True, settings: str = "") -> Path:
+    """Write the files of a run; without frames it has no recording. `settings` is their hash."""
     (folder / name).mkdir()
-    result = {"scenario": "street", "seed": 1, "channel": "ideal", "passed": passed, "end_reason": "stop trigger"}
-    (folder / name / "result.json").write_text(json.dumps({**result, "criteria": [], "trace_hash": "0"}))
+    result: dict[str, Any] = {"scenario": "street", "seed": 1, "channel": "ideal", "passed": passed}
+    result["end_reason"] = "stop trigger"
+    result |= {"criteria": [], "trace_hash": "0", "settings_sha256": settings}
+    (folder / name / "result.json").write_text(json.dumps(result))
     if frames is not None:
         recorder = Recorder(folder / name / "recording.mcap", metadata={"scenario": "street", "seed": "1"})
         for frame in frames:
@@ -108,6 +110,17 @@ def test_runs_of_equal_names_have_replays_of_their_own(street: Play, tmp_path: P
     assert len({entry.replay for entry in linked}) == 2
 
 
+def test_copies_of_a_run_share_one_replay(street: Play, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run `a` is in two folders and in the store of a sweep; at most two replays are written."""
+    monkeypatch.setattr("eidrive_scenario.reporting.replay.page.MOST", 2)
+    files = [stored_run(tmp_path, name, street(1)[:3], settings=name[0]) for name in ("b", "a", "a copy")]
+    runs, _ = read_runs(files)
+    swept = runs[1].model_copy(update={"sweep": "s.db"})
+    linked, omitted = write_replays([*runs, swept], tmp_path / "out")
+    assert ([entry.replay for entry in linked], omitted) == (["replays/b.html", *["replays/a.html"] * 3], [])
+    assert {path.name for path in (tmp_path / "out" / "replays").iterdir()} == {"a.html", "b.html", "three.js"}
+
+
 def test_replays_of_a_report_share_one_file_of_three_js(street: Play, tmp_path: Path) -> None:
     files = [stored_run(tmp_path, name, street(1)[:3]) for name in ("a", "b")]
     linked, _ = write_replays(read_runs(files)[0], tmp_path / "out")
@@ -140,6 +153,8 @@ def test_failed_runs_have_replays_before_passed_ones(
     linked, omitted = write_replays(read_runs(files)[0], tmp_path / "out")
     assert [bool(entry.replay) for entry in linked] == [False, True, False, True]
     assert omitted == ["2 passed or later runs have no replay: `eidrive view` writes it"]
+    _, omitted = write_replays(linked[:3], tmp_path / "out")
+    assert omitted == ["1 passed or later run has no replay: `eidrive view` writes it"]
 
 
 @pytest.mark.parametrize("field", ["folder", "replay"])
