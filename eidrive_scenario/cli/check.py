@@ -58,10 +58,9 @@ def check(
         check_seconds("--wall-limit", wall_limit)
         supervise(wall_limit, report_hang, what="check")
     missing: list[Diagnostic] = []
-    if sarif is not None:
-        check_output_paths({"--sarif": sarif}, paths)
     aborted: list[BaseException] = []
     files, ignored = list(_files(paths, missing)), tuple(ignore or ())
+    check_output_paths({"--sarif": sarif}, files)
     printed: dict[str, dict[Diagnostic, None]] = {"error": dict.fromkeys(missing), "warning": {}, "note": {}}
     for diagnostic in missing:
         echo(str(diagnostic))

@@ -43,12 +43,13 @@ def results(
         write_parquet,
     )
     from eidrive_scenario.experiments.sweeps.store import PASSED as PASSED_RUN
+    from eidrive_scenario.recording.run_files import result_paths
 
     if not 0.0 < confidence < 1.0:
         raise SettingError(Diagnostic(f"--confidence is {confidence}", "give a number between 0 and 1"))
     if json and failures:
         raise SettingError(Diagnostic("--json and --failures exclude each other", "give one of them"))
-    check_output_paths({"--csv": csv, "--parquet": parquet}, stores)
+    check_output_paths({"--csv": csv, "--parquet": parquet}, result_paths(stores))
     runs = list(stored_runs(stores, print_warning))
     names = None if by is None else [name.strip() for name in by.split(",")]
     points = summaries(runs, by=names, interval=interval, confidence=confidence)
@@ -148,6 +149,7 @@ def compare(
 
     from eidrive_scenario.experiments.sweeps.comparison import NOT_WORSE, NamedComparison, compare_values
     from eidrive_scenario.experiments.sweeps.comparison import compare as compare_stores
+    from eidrive_scenario.recording.run_files import result_paths
     from eidrive_scenario.reporting.comparison import as_json, as_markdown, text_lines, write_comparison
 
     if not 0.0 <= margin < 1.0:
@@ -156,7 +158,7 @@ def compare(
         raise SettingError(Diagnostic(f"--confidence is {confidence}", "give a number between 0.5 and 1"))
     if json and markdown:
         raise SettingError(Diagnostic("--json and --markdown exclude each other", "give one of them"))
-    check_output_paths({"--html": html}, stores)
+    check_output_paths({"--html": html}, result_paths(stores))
     if between is not None:
         name, equals, listed = between.partition("=")
         values = [text.strip() for text in listed.split(",")] if equals else []

@@ -125,8 +125,8 @@ def tree(
     from eidrive_scenario.storyboard.storyboard import Storyboard
 
     path = resolve_scenario(scenario)
-    check_output_paths({"--svg": svg}, [path])
     loaded = load_scenario(path)
+    check_output_paths({"--svg": svg}, [path, loaded.road_file, *loaded.catalogs])
     roads = RoadNetwork.load(loaded.road_file) if loaded.road_file else None
     storyboard = Storyboard(loaded, roads, dt=0.05, seed=0)
     if svg is not None:
@@ -191,7 +191,7 @@ def view(
     Example: eidrive view reports/scenario_1 --browser
     """
     from eidrive_scenario.recording.recording import open_recording
-    from eidrive_scenario.recording.run_files import is_partial, recording_in
+    from eidrive_scenario.recording.run_files import RESULT, is_partial, recording_in
 
     path = recording_in(recording)
     stills = {"--png": png, "--svg": svg, "--pdf": pdf}
@@ -208,7 +208,7 @@ def view(
         raise SettingError(Diagnostic("pictures and films show one recording (got two)", "omit the second one"))
     second = None if other is None else recording_in(other)
     outputs = {"--out": page, **stills, "--gif": gif, "--mp4": mp4}
-    check_output_paths(outputs, [path, *([second] if second else [])])
+    check_output_paths(outputs, [file for run in (path, second) if run for file in (run, run.with_name(RESULT))])
     opened = open_recording(path)
     if has_pictures:
         from eidrive_scenario.recording.integrity import DamageReport

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from eidrive_scenario.base.randomness import checked_seed
 from eidrive_scenario.base.wall_limit import limit_wall_time
-from eidrive_scenario.errors import Diagnostic, InputError, SettingError
+from eidrive_scenario.errors import Diagnostic, InputError, OutputError, SettingError
 from eidrive_scenario.experiments.commands import command_of_source
 from eidrive_scenario.experiments.run_folder import RunFolder, run_folder
 from eidrive_scenario.extensions.library import resolve_scenario
@@ -101,10 +101,11 @@ def run_and_save(
                 folder = stack.enter_context(run_folder(location, simulation.resolved, own=out is None))
             if log is not None:
                 if str(log) != STANDARD_OUTPUT:
-                    stack.enter_context(exclusive(path_argument(log, "log")))
+                    stack.enter_context(exclusive(_output(log, "log", simulation.storyboard.scenario)))
                 simulation.add_observer(RunLog(log))
             if csv is not None:
-                simulation.add_observer(CsvWriter(stack.enter_context(atomic_output(path_argument(csv, "csv")))))
+                table = _output(csv, "csv", simulation.storyboard.scenario)
+                simulation.add_observer(CsvWriter(stack.enter_context(atomic_output(table))))
             if folder is not None and kept is not RecordMode.NEVER:
                 recording = folder.recording
                 if limit is not None:
@@ -124,6 +125,15 @@ def run_and_save(
         if recording is not None and recording.exists():
             error.add_note(f"recording: {recording}")
         raise
+
+
+def _output(path: str | os.PathLike[str], name: str, scenario: Scenario) -> Path:
+    """Return an output path of this name. Raise OutputError for a file that the scenario refers to."""
+    output = path_argument(path, name)
+    read = (scenario.road_file, *scenario.catalogs)
+    if os.path.realpath(output) in {os.path.realpath(file) for file in read if file is not None}:
+        raise OutputError(Diagnostic("the run would overwrite an input file", "choose another path", str(output)))
+    return output
 
 
 def _record(

@@ -1,12 +1,21 @@
 """Output paths: never an input file, and never one file for two outputs."""
 
+import re
+import shutil
 from pathlib import Path
 
 import pytest
 from command_fixtures import Eidrive
+from opendrive_xml import map_xml, road_xml
+from openscenario_xml import road_file_xml
 
 from eidrive_scenario.cli.options import check_output_paths
 from eidrive_scenario.errors import SettingError
+
+CATALOGS = Path(__file__).parents[2] / "data" / "catalogs"
+CATALOG_LOCATIONS = """<CatalogLocations>
+  <VehicleCatalog><Directory path="catalogs"/></VehicleCatalog>
+</CatalogLocations>"""
 
 
 @pytest.fixture
@@ -72,6 +81,46 @@ def test_hyphen_is_no_path_of_an_output(eidrive: Eidrive, inputs: dict[str, Path
         result = eidrive(*(text.format(**inputs) for text in command.split()), option, "-")
         assert (result.exit_code, result.stderr.partition(";")[0]) == (2, f"{option}: - is not a path")
         assert not list(Path().iterdir())
+
+
+@pytest.mark.parametrize(
+    ("command", "options", "name"),
+    [
+        ("check {run}/..", "--sarif", "own.xosc"),
+        ("compare {run} {run}", "--html", "result.json"),
+        ("export {run}", "--csv", "recording.mcap"),
+        ("results {run}", "--csv --parquet", "result.json"),
+        ("view {run}", "--out --gif", "result.json"),
+    ],
+)
+def test_output_path_of_file_that_is_read_in_folder_is_invalid_input(
+    eidrive: Eidrive, inputs: dict[str, Path], command: str, options: str, name: str
+) -> None:
+    (path,) = inputs["run"].parent.rglob(name)
+    before = path.read_bytes()
+    for option in options.split():
+        result = eidrive(*(text.format(**inputs) for text in command.split()), option, path)
+        assert (result.exit_code, f"{path}: {option} would overwrite an input file" in result.stderr) == (2, True)
+        assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize(("command", "option"), [("run", "--csv"), ("run", "--log"), ("tree", "--svg")])
+@pytest.mark.parametrize("name", ["road.xodr", "Vehicles.xosc"])
+def test_output_path_of_file_to_which_scenario_refers_is_invalid_input(
+    eidrive: Eidrive, own: Path, command: str, option: str, name: str
+) -> None:
+    """The parked car is an entry of a catalog."""
+    shutil.copytree(CATALOGS, own.with_name("catalogs"))
+    own.with_name("road.xodr").write_text(map_xml(road_xml(length=200.0)))
+    entry = '<CatalogReference catalogName="Vehicles" entryName="red_van"/>'
+    text = own.read_text().replace("<RoadNetwork/>", f"<RoadNetwork>{road_file_xml('road.xodr')}</RoadNetwork>")
+    text = text.replace("<CatalogLocations/>", CATALOG_LOCATIONS)
+    own.write_text(re.sub(r'(name="Parked">\s*)<Vehicle.*?</Vehicle>', rf"\1{entry}", text, flags=re.DOTALL))
+    (path,) = own.parent.rglob(name)
+    before = path.read_bytes()
+    result = eidrive(command, own, option, path)
+    assert (result.exit_code, "would overwrite an input file" in result.stderr) == (2, True), result.output
+    assert path.read_bytes() == before
 
 
 @pytest.mark.parametrize("option", ["--csv", "--log"])
