@@ -61,7 +61,8 @@ def report_files(
         for line in without:
             warn(line)
     if figures is not None and not write_rate_figures(results, figures, size or DEFAULT_SIZE):
-        warn("--figures: the report has no curve and no heat map: no number varies between its runs")
+        reason = "no number varies between its runs of sweeps (give their stores) and of distributions"
+        warn(f"--figures: the report has no curve and no heat map: {reason}")
     return write_run_report(results, out, omitted=omitted, unjudged=unjudged)
 
 
