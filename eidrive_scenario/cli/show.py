@@ -216,7 +216,7 @@ def view(
         from eidrive_scenario.reporting.replay import film
         from eidrive_scenario.reporting.run_report.reported_runs import run_of_recording
 
-        for option, file in stills.items():
+        for option, file in {**stills, "--gif": gif, "--mp4": mp4}.items():
             check_format(option, file, (option.replace("--", "."),))
         of_result = DamageReport()
         recorded = film.RecordedStation(opened, station, result=run_of_recording(path, of_result))

@@ -313,7 +313,7 @@ def write_figure(figure: Figure, path: str | os.PathLike[str], resolution: float
 
 
 def check_format(option: str, path: Path | None, suffixes: tuple[str, ...] = tuple(NO_METADATA)) -> None:
-    """Raise SettingError if a picture has another suffix than these."""
+    """Raise SettingError if a picture or film has another suffix than these."""
     if path is not None and path.suffix.lower() not in suffixes:
         hint = f"give a file name in {', '.join(suffixes)}"
         raise SettingError(Diagnostic(f"{option}: unknown format (got {quoted(str(path))})", hint))

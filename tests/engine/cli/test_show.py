@@ -146,8 +146,13 @@ def test_view_writes_vector_figures(eidrive: Eidrive, passing_by: Path, tmp_path
     result = eidrive("view", tmp_path, *[word for suffix, file in files.items() for word in (f"--{suffix}", file)])
     assert result.stdout.split() == [str(file) for file in files.values()]
     assert [file.read_bytes()[:5] for file in files.values()] == [b"\x89PNG\r", b"<?xml", b"%PDF-"]
-    result = eidrive("view", tmp_path, "--png", tmp_path / "b.pdf")
-    assert (result.exit_code, "--png: unknown format" in result.stderr) == (2, True)
+    for option, name in (("--png", "b.pdf"), ("--gif", "b.mp4"), ("--mp4", "b.gif")):
+        result = eidrive("view", tmp_path, option, tmp_path / name)
+        hint = f"give a file name in {option.replace('--', '.')}"
+        assert (result.exit_code, result.stderr) == (
+            2,
+            f"{option}: unknown format (got {str(tmp_path / name)!r}); {hint}\n",
+        )
 
 
 @pytest.mark.parametrize(
