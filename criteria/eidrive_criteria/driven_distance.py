@@ -14,16 +14,17 @@ from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, V
 class DrivenDistanceSettings(CriterionSettings):
     """Settings: `{of: Ego, at_least: 100, by: 30}` with distance [m] and deadline by [s].
 
-    A fatal criterion ends the run at an expired deadline. Without `by` it is open until the end.
+    A fatal criterion ends the run at an expired deadline. Without `by` it is open until the end. Without `at_least` it
+    only measures and passes.
     """
 
     of: str
-    at_least: Annotated[float, Field(gt=0)]
+    at_least: Annotated[float, Field(gt=0)] | None = None
     by: Annotated[float, Field(gt=0)] | None = None
 
 
 class DrivenDistance(Criterion):
-    """Criterion that passes once the actor has driven a distance.
+    """Criterion that passes once the actor has driven the distance `at_least`.
 
     The distance is the integral of the speed (trapezoidal rule), so that teleports do not count.
     """
@@ -31,12 +32,12 @@ class DrivenDistance(Criterion):
     settings_type = DrivenDistanceSettings
     name = "driven_distance"
     unit = "m"
-    demands_progress = True
 
     def __init__(self, settings: DrivenDistanceSettings) -> None:
         super().__init__(settings)
         self._settings = settings
         self.subjects = (settings.of,)
+        self.demands_progress = settings.at_least is not None
         self._distance = 0.0
         self._was_present = False
         self._last: tuple[float, float] | None = None

@@ -47,10 +47,13 @@ def test_reach_position_is_fatal_after_the_deadline_only(frame: Any, car: Any) -
 
 
 def test_driven_distance_is_compared_with_at_least(frame: Any, car: Any) -> None:
-    far, farther = (DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=meters)) for meters in (20.0, 20.1))
-    verdicts = evaluate_criteria(driving(frame, car), [far, farther])
-    assert [verdict.passed for verdict in verdicts] == [True, False]
-    assert verdicts[0].value == pytest.approx(20.0)
+    """Without it, the distance is measured only."""
+    limits = (20.0, 20.1, None)
+    criteria = [DrivenDistance(DrivenDistanceSettings(of="Ego", at_least=meters)) for meters in limits]
+    verdicts = evaluate_criteria(driving(frame, car), criteria)
+    assert [(verdict.passed, verdict.limit) for verdict in verdicts] == [(True, 20.0), (False, 20.1), (True, None)]
+    assert [verdict.value for verdict in verdicts] == pytest.approx([20.0] * 3)
+    assert [criterion.demands_progress for criterion in criteria] == [True, True, False]
 
 
 def test_metrics_of_driven_distances_with_different_deadlines_are_separate(frame: Any, car: Any) -> None:
