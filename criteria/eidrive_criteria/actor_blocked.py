@@ -12,7 +12,7 @@ from eidrive_scenario.api.criteria import Criterion, CriterionSettings, Frame, V
 
 
 class ActorBlockedSettings(CriterionSettings):
-    """Settings: `{of: Ego, at_most: 180, below: 0.1}` with the time [s] and the speed of a blocked actor [m/s]."""
+    """Settings: `{of: Ego, at_most: 180, below: 0.1}` with the time at_most [s] and the speed below [m/s]."""
 
     of: str
     at_most: Annotated[float, Field(gt=0)] = 180.0

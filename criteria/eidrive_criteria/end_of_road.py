@@ -12,7 +12,7 @@ from eidrive_scenario.api.common import EPSILON, LaneKey, WorldView
 
 
 class EndOfRoadSettings(SummedSettings):
-    """Settings: `{of: Ego, within: 1.0, at_most: 0}` with distance [m] and time [s]."""
+    """Settings: `{of: Ego, within: 1.0, at_most: 0}` with the distance within [m] and the time at_most [s]."""
 
     within: Annotated[float, Field(ge=0)] = 1.0
 

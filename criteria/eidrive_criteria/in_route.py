@@ -15,7 +15,8 @@ from eidrive_scenario.api.criteria import Place, Verdict
 class InRouteSettings(RouteSettings):
     """Settings: `{of: Ego, at_most: 30, beyond: 15, share: 0.3}` [m].
 
-    beyond, share  maximum share of the length of the route that is driven at a distance above `beyond` from it
+    beyond  distance from the route above which the way counts for `share` [m]
+    share   maximum share of the length of the route that is driven at a distance above `beyond` from it
     """
 
     at_most: Annotated[float, Field(ge=0)] = 30.0

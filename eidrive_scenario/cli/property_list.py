@@ -27,12 +27,14 @@ LONGEST = 80
 _ENTRY = re.compile(r"^(\w+(?:, *\w+)*)  +(.*)$")
 """Line of the documentation of a class: names of settings, two spaces, and their description."""
 _UNIT = re.compile(r"\[([^\]]*)\]")
+_UNITS = re.compile(rf" *{_UNIT.pattern}(?:, {_UNIT.pattern})+")
+"""Units of several settings."""
 _INLINE = re.compile(r"((?:\w+, )*\w+) \[([^\]]*)\]")
 """Names of settings in a sentence, followed by their unit."""
 _SUFFIXES = {"_dbm": "dBm", "_dbi": "dBi", "_db": "dB", "_ghz": "GHz", "_mbps": "Mbit/s"}
 """Units with which names of settings end."""
 _LIMITS = ("at_most", "at_least", "below")
-"""Settings of criteria in the unit of the criterion."""
+"""Settings of criteria in the unit of the criterion, unless their documentation states another one."""
 
 
 _TYPES = {Path: "file", float: "number", int: "integer", bool: "true | false", str: "text", NoneType: "none"}
@@ -66,7 +68,8 @@ def properties(warn: Callable[[str], None]) -> Iterator[Property]:
             model = getattr(extension, "settings_type", None)
             if isinstance(model, type) and issubclass(model, BaseModel):
                 for entry in _of_model(f"{singular(group)} {name}", model):
-                    yield entry._replace(unit=extension.unit) if group == "criteria" and entry.key in _LIMITS else entry
+                    is_limit = group == "criteria" and entry.key in _LIMITS and not entry.unit
+                    yield entry._replace(unit=extension.unit) if is_limit else entry
 
 
 def _of_model(owner: str, model: type[BaseModel], above: str = "") -> Iterator[Property]:
@@ -75,7 +78,7 @@ def _of_model(owner: str, model: type[BaseModel], above: str = "") -> Iterator[P
         key = f"{above}{field.alias or name}"
         text = texts.get(name, "")
         units = [*_UNIT.findall(text), *(unit for end, unit in _SUFFIXES.items() if name.endswith(end)), ""]
-        words = re.sub(r" +([;,.])(?!\w)", r"\1", _UNIT.sub("", text)).removesuffix(".")
+        words = re.sub(r" +([;,.])(?!\w)", r"\1", _UNIT.sub("", text)).lstrip(" ;").removesuffix(".")
         description = textwrap.shorten(words, LONGEST, placeholder=" …")
         yield Property(owner, key, type_text(field.annotation), _default(field), units[0], description)
         models = [nested for nested in _models(field.annotation) if nested is not model]
@@ -110,7 +113,8 @@ def _documented(text: str) -> dict[str, str]:
             units = _UNIT.findall(match[2])
             texts |= dict.fromkeys(names, match[2])
             if len(units) == len(names):
-                texts |= {name: f"{_UNIT.sub('', match[2])} [{unit}]" for name, unit in zip(names, units, strict=True)}
+                text = _UNITS.sub("", match[2])
+                texts |= {name: f"[{unit}]{text}" for name, unit in zip(names, units, strict=True)}
         elif names and line.startswith("    "):
             texts |= {name: f"{texts[name]} {line.strip()}" for name in names}
         else:

@@ -107,7 +107,7 @@ class CameraSettings(SensorSettings):
     near, far      distances between which objects are drawn [m]
     noise          of the image sensor; None: no noise
     exposure_time, gain   [s], [dB]; None: automatic, within the maxima
-    max_exposure_time, max_gain   [s], [dB]
+    max_exposure_time, max_gain   maxima of automatic exposure [s], [dB]
     lens_drops     whether rain reaches the lens
     supersampling  rays per pixel and axis: 2 smooths edges at four times the cost
     """

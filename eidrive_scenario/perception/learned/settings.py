@@ -31,8 +31,9 @@ class LearnedSettings(Settings):
 
     weights      path relative to the working directory: .npz as training/train.py writes it, an ONNX model (.onnx) or a
                  TorchScript model (.pt), which is loaded only with permission of the user; None: the shipped weights
-    classes, input_size, layout   of an .onnx or .pt: its classes in order, width and height of its input [px], and the
-                 layout of its outputs, if the shape does not determine it
+    classes      of an .onnx or .pt: its classes in order
+    input_size   of an .onnx or .pt: width and height of its input [px]
+    layout       of an .onnx or .pt: layout of its outputs, if the shape does not determine it
     letterbox    of an .onnx or .pt: whether images keep their aspect ratio, with gray margins; otherwise stretched
     confidence   minimum score of a box; None: the optimum of the shipped weights, and 0.35 for others
     runtime      library that executes the network; `auto`: the fastest one that is installed

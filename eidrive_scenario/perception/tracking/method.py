@@ -28,7 +28,7 @@ class TrackerSettings(TrackerKind):
     """Settings of the property `tracker`: a kind, or a mapping with these keys.
 
     kind      cv: constant velocity; ctrv: constant turn rate and speed; none
-    confirm   [n, m]: an object is reported once it was detected in n of m successive scans that can show it, and
+    confirm   n, m: an object is reported once it was detected in n of m successive scans that can show it, and
     confirm_existence   minimum probability of existence for that: 0.5 is the likelier of the two hypotheses
     delete_existence    probability of existence below which a track is deleted
     coast     maximum time without a detection, after which a track is deleted regardless of its existence [s]

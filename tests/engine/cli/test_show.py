@@ -105,6 +105,14 @@ def test_list_of_properties_shows_type_default_and_unit(eidrive: Eidrive) -> Non
     assert {key for owner, key in rows if owner == "station"} >= set(AgentSettings.model_fields)
     texts = {(owner, key): rest[-1] for owner, key, *rest in cells}
     assert texts["detector ssd", "device"].startswith("`cuda` executes .npz and .pt")
+    assert all(re.match(r"[\w`.(]", text) and not text.endswith(",") for text in texts.values() if text)
+    assert texts["sensor camera", "exposure_time"] == "None: automatic, within the maxima"
+    assert texts["station", "false_objects.speed"] == "of its motion"
+    assert texts["planner behavior", "time_gap"].startswith("parameters of the Intelligent Driver Model, by")
+    assert rows["sensor camera", "max_gain"] == ["number", "36", "dB"]
+    assert [rows["detector ssd", key][2] for key in ("classes", "input_size", "layout")] == ["", "px", ""]
+    assert [rows["criterion actor_blocked", key][2] for key in ("at_most", "below")] == ["s", "m/s"]
+    assert [rows["criterion in_route", key][2] for key in ("at_most", "beyond", "share")] == ["m", "m", ""]
 
 
 def test_list_of_properties_names_extensions_that_do_not_load(eidrive: Eidrive) -> None:
