@@ -183,7 +183,10 @@ def _import_modules(folder: Path) -> None:
             _imported.discard(folder)
             if not isinstance(error, Exception | SystemExit):
                 raise
-            text = f"{type(error).__name__}: {error} ({_raised_at(error)})"
+            location = _raised_at(error)
+            text = f"{type(error).__name__}: {error}" + (f" ({location})" if location else "")
+            if isinstance(error, ModuleNotFoundError) and f"{name}.".startswith(f"{error.name}."):
+                text += "; name its folder in pythonpath"
             raise RegistryError(f"module {name!r} of the project {folder} does not import: {text}") from error
 
 

@@ -125,6 +125,7 @@ def test_scenario_does_not_import_modules_of_its_project(root: Path, tmp_path: P
         ("3", 2, "tool.eidrive.modules: '3'"),
         ('["no name"]', 2, "'no name' is not the name of a module"),
         ('["absent"]', 3, "module 'absent' of the project"),
+        ('["absent"]', 3, "ModuleNotFoundError: No module named 'absent'; name its folder in pythonpath\n"),
         ('["faulty"]', 3, "faulty.py:1"),
     ],
 )
