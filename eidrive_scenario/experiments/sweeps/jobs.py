@@ -323,11 +323,18 @@ def _with_space(points: Sequence[Point], space: Sequence[Axis]) -> Sequence[Poin
 
 
 def _check_names_of_runs(scenario: Path, points: Sequence[Point], settings: RunSettings, is_distribution: bool) -> None:
-    """Raise SettingError if an axis has the name of the runs of a distribution.
+    """Raise SettingError if an axis has the name of the runs of a distribution, or of a setting of all runs.
 
     So does an axis or a setting of all runs with the name of a parameter that the distribution varies.
     """
     names = dict.fromkeys(name for point in points for name in point)
+    for name in names:
+        parameter = name.removeprefix(PARAMETER)
+        if name in SETTINGS and getattr(settings, name) != getattr(RunSettings(), name):
+            raise SettingError(Diagnostic(f"RunSettings.{name}: --vary varies this setting", "remove the option"))
+        if not is_setting(name) and parameter in settings.parameters:
+            text = f"RunSettings.parameters: --vary varies parameter {parameter!r}"
+            raise SettingError(Diagnostic(text, "remove the option"))
     if RUN in names:
         hint = f"give {PARAMETER}{RUN} for a parameter of this name; all runs of a distribution are executed"
         raise SettingError(Diagnostic(f"--vary: {RUN!r} is the number of a run of a distribution", hint))
