@@ -174,7 +174,7 @@ def explain_outcome(result: RunResult | RateVerdict) -> str:
         return printable(explain(result))
     shown = [explain(failure) for failure in failures_of(result)]
     more = len(result.failures) - len(shown)
-    return printable("\n\n".join([str(result), *shown, *([f"and {more} more failed runs"] if more else [])]))
+    return printable("\n\n".join([str(result), *shown, *([f"and {counted(more, 'more failed run')}"] if more else [])]))
 
 
 def explain(result: RunResult) -> str:

@@ -352,7 +352,7 @@ def _yaml_source(setting: str, value: Any, hint: str) -> YamlSource:
         return Path(value)
     if isinstance(value, str) and value.strip():
         return value
-    raise SettingError(Diagnostic(f"{setting} is {quoted(value)}", hint))
+    raise SettingError(Diagnostic(f"RunSettings.{setting} is {quoted(value)}", hint))
 
 
 def _file_or_text(source: YamlSource) -> str:

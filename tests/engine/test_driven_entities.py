@@ -184,6 +184,7 @@ def test_torchscript_of_a_stack_needs_permission(tmp_path: Path, monkeypatch: py
         ("drive", {"Ego": {"range": object()}}, r"drive\['Ego'\] is .*, which is not YAML"),
         ("drive", {"Ego": "  "}, r"drive\['Ego'\] is '  '"),
         ("criteria", 5, "criteria is 5; give a mapping"),
+        ("criteria", "", r"RunSettings\.criteria is ''; give a mapping"),
         ("criteria", [["collision"]], r"criteria is \['collision'\]; give a mapping"),
     ],
 )

@@ -70,6 +70,7 @@ def test_table_2_continues_after_a_kill_and_repeats_its_tables(
     ("arguments", "message"),
     [
         (("tabel2",), "part: unknown name 'tabel2'; did you mean 'table2'?"),
+        (("benchmarks",), "part: unknown name 'benchmarks'; did you mean 'benchmark'?"),
         (("table2", "--detectors", "yolov6"), "--detectors: unknown name 'yolov6'"),
         (("table2", "--detectors", "oracle,"), "--detectors: unknown name ''"),
         (("table2", "--detectors", "ssd"), "--detectors: part table2 uses none of them (got 'ssd'); known: oracle"),

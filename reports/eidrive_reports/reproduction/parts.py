@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from eidrive_reports.reproduction import channels, detection, drives, learned, perception, sensitivity, table_2, table_3
+from eidrive_reports.reproduction import (
+    benchmark,
+    channels,
+    detection,
+    drives,
+    learned,
+    perception,
+    sensitivity,
+    table_2,
+    table_3,
+)
 from eidrive_reports.reproduction.part import Part
 from eidrive_scenario.api.common import Diagnostic, SettingError, quoted, suggestion
 
@@ -33,7 +43,7 @@ def selected_parts(names: Sequence[str], others: Mapping[str, Part] | None = Non
     Raise SettingError for an unknown name.
     """
     others = others or {}
-    _check_names("part", names, (*PARTS, *others, ALL))
+    _check_names("part", names, dict.fromkeys((*PARTS, *others, benchmark.NAME, ALL)))
     chosen = [part for name, part in PARTS.items() if ALL in names or name in names]
     return (*chosen, *(part for name, part in others.items() if name in names))
 
