@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.base.geometry import wrap_angle
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.errors import Diagnostic, suggestion
 from eidrive_scenario.files.bounded import path_argument
 from eidrive_scenario.roads.geometry import poses
@@ -49,6 +50,8 @@ FREE_SPEED = 130.0 / 3.6
 USUAL_SPEED = 50.0 / 3.6
 USUAL_SPEEDS = {"motorway": FREE_SPEED, "rural": 100.0 / 3.6, "lowSpeed": 30.0 / 3.6}
 """Usual speeds on roads of a type, and on others, without a stated limit [m/s]: the general limits in Germany."""
+MOST_ITERATIONS = 10
+"""Maximum number of iterations for a distance along a lane; one suffices where its curvature is constant."""
 KEPT = 2
 """Maximum number of road networks that are kept for the next run."""
 OTHER_LEVEL = 3.5
@@ -549,17 +552,36 @@ class RoadNetwork:
             raise RouteError(named) from None
 
     def distance(
-        self, a: LaneLocation, b: LaneLocation, by: Chain = "shortest", route: Route | None = None, sense: int = 0
+        self,
+        a: LaneLocation,
+        b: LaneLocation,
+        by: Chain = "shortest",
+        route: Route | None = None,
+        sense: int = 0,
+        *,
+        along_lane: bool = False,
     ) -> tuple[float, float] | None:
         """Return the distances from a to b ahead and to the left [m] in road coordinates, or None.
 
         They refer to the driving direction of the lane of a, and are negative for behind and right. They are measured
-        along connected roads, with `sense` 1 ahead only and -1 behind only, or along `route`. The result is None if the
-        roads are not connected or the route misses a location.
+        along the reference lines of connected roads, with `sense` 1 ahead only and -1 behind only, or along `route`;
+        with `along_lane` along the center of the lane of a, unless this ends before b. The result is None if the roads
+        are not connected or the route misses a location.
         """
-        if route is None:
-            return self._distances.between(a, b, by, sense)
-        return route.distance(a, b)
+        distances = self._distances.between(a, b, by, sense) if route is None else route.distance(a, b)
+        if not along_lane or distances is None:
+            return distances
+        ahead, left = distances
+        length, center = ahead, a._replace(offset=0.0)
+        for _ in range(MOST_ITERATIONS):
+            there = self.advance(center, length, route=route)
+            rest = None if there is None else self.distance(there, b)
+            if rest is None or abs(rest[0]) >= abs(ahead):
+                break
+            if abs(rest[0]) < EPSILON:
+                return length, left
+            length *= ahead / (ahead - rest[0])
+        return distances
 
     def orientation(self, a: LaneLocation, b: LaneLocation) -> int | None:
         """Return +1 if s of the road of b increases in the direction of s of the road of a along the chain, else -1.

@@ -6,6 +6,7 @@ Ego drives at 20 m/s from x = 100 in lane -1.
 from __future__ import annotations
 
 import pytest
+from opendrive_xml import lanes_xml, map_xml, road_xml
 from recorded_scene import RunScene, first_start
 from storyboard_xml import by_entity_xml
 from street_scene import NOTHING
@@ -74,6 +75,18 @@ def test_clearance_without_the_lane_is_false(scene: RunScene) -> None:
         'oppositeLanes="false"><RelativeLaneRange from="-1" to="-1"/></RelativeClearanceCondition>'
     )
     assert first_start(scene(0.2, ("Ego", NOTHING, condition), ego=(-2, 100, 20))) is None
+
+
+@pytest.mark.parametrize(("s", "clear"), [(127.0, False), (128.0, True)])
+def test_clearance_in_a_bend_is_measured_along_the_lane(scene: RunScene, s: float, clear: bool) -> None:
+    """The radius of lane -3 is 110 m: 30 m along its center are 27.3 m along the reference line."""
+    condition = by_entity_xml(
+        '<RelativeClearanceCondition distanceForward="30" distanceBackward="0" freeSpace="false" '
+        'oppositeLanes="false"><RelativeLaneRange from="0" to="0"/></RelativeClearanceCondition>'
+    )
+    street = map_xml(road_xml(length=600.0, curvature=0.01, lanes=lanes_xml(1, 3, 4)))
+    played = scene(0.2, ("Ego", NOTHING, condition), ego=(-3, 100, 20), other=(-3, s, 20), street=street)
+    assert first_start(played) == (0.0 if clear else None)
 
 
 @pytest.mark.parametrize("free_space", ["true", "false"])

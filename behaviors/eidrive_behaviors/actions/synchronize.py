@@ -22,15 +22,13 @@ from eidrive_scenario.api.actions import (
     resolve_position,
     trajectory_of,
 )
-from eidrive_scenario.api.common import EPSILON, LaneLocation, RoadNetwork, Route
+from eidrive_scenario.api.common import EPSILON
 
 JUST_PASSED = 10.0
 """Distance behind the actor, besides that of one step, up to which it has passed its target [m]; it drives around to a
 target farther behind."""
 ON_LINE = 0.1
 """Maximum speed difference to the linear last phase at which the first phase ends [m/s]."""
-MOST_ITERATIONS = 10
-"""Maximum number of iterations for the distance along a lane; one suffices where its curvature is constant."""
 HARD = 8.0
 """Deceleration if the distance is too short for a lower one [m/s²]."""
 
@@ -219,15 +217,17 @@ class SynchronizeAction(ActionBehaviour):
             return straight
         sense *= facing(self.context, name, start)
         route = actor.motion.route
-        on_route = None if route is None else roads.distance(start, target.location, route=route)
+        on_route = None if route is None else roads.distance(start, target.location, route=route, along_lane=True)
         if on_route is not None:
-            return _along_lane(roads, start, target.location, on_route[0], route) * sense
-        shortest = roads.distance(start, target.location)
+            return on_route[0] * sense
+        shortest = roads.distance(start, target.location, along_lane=True)
         if shortest is None:
             return straight
-        if shortest[0] * sense <= -JUST_PASSED - abs(self.context.speed(name)) * self.context.dt:
-            shortest = roads.distance(start, target.location, sense=1 if sense > 0.0 else -1) or shortest
-        return _along_lane(roads, start, target.location, shortest[0], route) * sense
+        way = shortest[0] * sense
+        if way > -JUST_PASSED - abs(self.context.speed(name)) * self.context.dt:
+            return way
+        ahead = roads.distance(start, target.location, sense=1 if sense > 0.0 else -1, along_lane=True)
+        return way if ahead is None else abs(ahead[0])
 
     def _along(self, progress: TrajectoryProgress, name: str, position: model.Position, sense: float) -> float:
         """Return the distance along the trajectory of the entity, in its direction of motion [m]."""
@@ -275,22 +275,3 @@ class SynchronizeAction(ActionBehaviour):
     def describe(self) -> str:
         """Describe the master."""
         return f"arrive together with {self.action.master_entity_ref}"
-
-
-def _along_lane(
-    roads: RoadNetwork, start: LaneLocation, target: LaneLocation, distance: float, route: Route | None
-) -> float:
-    """Return the distance along the lane of `start` until it is beside `target` [m].
-
-    distance  distance along the reference lines [m]; the result if the lane does not lead to the target
-    """
-    length = distance
-    for _ in range(MOST_ITERATIONS):
-        there = roads.advance(start, length, route=route)
-        rest = None if there is None else roads.distance(there, target)
-        if rest is None or abs(rest[0]) >= abs(distance):
-            break
-        if abs(rest[0]) < EPSILON:
-            return length
-        length *= distance / (distance - rest[0])
-    return distance

@@ -52,7 +52,7 @@ class RelativeClearanceCondition(EntityCondition):
         if not locations or not any(self._in_range(context, entity, here, other) for other in covered_lanes(locations)):
             return False
         assert context.roads is not None
-        offsets = [context.roads.distance(here, other) for other in locations]
+        offsets = [context.roads.distance(here, other, along_lane=True) for other in locations]
         turn = facing(context, entity, here)
         along = [offset[0] * turn for offset in offsets if offset is not None]
         ahead, behind = self.element.distance_forward or 0.0, self.element.distance_backward or 0.0

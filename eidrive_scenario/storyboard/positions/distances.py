@@ -91,7 +91,7 @@ def _extent(context: ConditionContext, name: str, axis: float, frame: str, kind:
     if frame in ("lane", "road") and context.roads is not None:
         here = context.location(name)
         if here is not None and context.roads.curvature(here.road, here.s) != 0.0:
-            return _extent_on_bend(context, context.roads, name, here, axis, kind)
+            return _extent_on_bend(context, context.roads, name, here, axis, frame, kind)
     bounds = context.actors[name].entity.bounding_box
     turn = context.pose(name).h - axis
     cos, sin = math.cos(turn), math.sin(turn)
@@ -105,9 +105,9 @@ def _extent(context: ConditionContext, name: str, axis: float, frame: str, kind:
 
 
 def _extent_on_bend(
-    context: ConditionContext, roads: RoadNetwork, name: str, here: LaneLocation, axis: float, kind: str
+    context: ConditionContext, roads: RoadNetwork, name: str, here: LaneLocation, axis: float, frame: str, kind: str
 ) -> tuple[float, float]:
-    """Return the extent along a curved road, from the corners of the box in road coordinates [m]."""
+    """Return the extent along a curved road or lane, from the corners of the box in road coordinates [m]."""
     x, y, _, length, width, _, yaw = entity_box(context, name)
     cos, sin = math.cos(yaw), math.sin(yaw)
     sign = 1.0 if math.cos(roads.pose(here).h - axis) >= 0.0 else -1.0
@@ -115,7 +115,7 @@ def _extent_on_bend(
     for along, across in ((0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5)):
         dx, dy = along * length, across * width
         corner = roads.locate_at(x + dx * cos - dy * sin, y + dx * sin + dy * cos, here)
-        distances = None if corner is None else roads.distance(here, corner)
+        distances = None if corner is None else roads.distance(here, corner, along_lane=frame == "lane")
         if distances is not None:
             extents.append(sign * distances[0 if kind == "longitudinal" else 1])
     return min(extents, default=0.0), max(extents, default=0.0)
@@ -281,14 +281,17 @@ def _offsets(
     """Return the longitudinal and the lateral offset of `b` from actor `a` at `mine` [m]."""
     here, there = mine.pose, _pose(context, b)
     if frame in ("lane", "road") and context.roads is not None:
-        start, end = mine.location, _location(context, b)
+        start, end, along_lane = mine.location, _location(context, b), frame == "lane"
         if start is None or end is None:
             return math.nan, math.nan
         if algorithm is model.RoutingAlgorithm.ASSIGNED_ROUTE:
             route = context.actors[a].motion.route
-            distances = None if route is None else context.roads.distance(start, end, route=route)
+            distances = None
+            if route is not None:
+                distances = context.roads.distance(start, end, route=route, along_lane=along_lane)
         else:
-            distances = context.roads.distance(start, end, ROUTE_CRITERIA.get(algorithm, "shortest"))
+            criterion = ROUTE_CRITERIA.get(algorithm, "shortest")
+            distances = context.roads.distance(start, end, criterion, along_lane=along_lane)
         if distances is None:
             return math.nan, math.nan
         lane = context.roads.pose(start)

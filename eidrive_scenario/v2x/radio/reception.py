@@ -23,8 +23,9 @@ Codes = NDArray[np.int8]
 CAUSES = ("delivered", "half_duplex", "sensing", "busy", "propagation", "jamming", "collision", "queue")
 """Causes of loss in order of precedence; codes in arrays are indices. `queue`: dropped before transmission."""
 DELIVERED, HALF_DUPLEX, SENSING, BUSY, PROPAGATION, JAMMING, COLLISION, QUEUE = range(len(CAUSES))
-BACKGROUND = {"half_duplex": HALF_DUPLEX, "busy": BUSY, "collision": COLLISION}
-"""Causes added by background traffic. Causes of signal strength are excluded, because the link budget has them."""
+BACKGROUND = {"busy": BUSY, "collision": COLLISION}
+"""Causes added by background traffic. Those of signal strength and of the station's own transmissions are excluded: the
+link budget and the access to the medium have them."""
 _SALTS = np.arange(1, len(BACKGROUND) + 1, dtype=np.uint64)[:, None, None]
 
 

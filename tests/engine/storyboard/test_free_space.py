@@ -45,13 +45,16 @@ def on_hairpin(context: Any) -> Any:
 def test_free_space_around_a_bend_is_between_facing_ends(
     on_hairpin: Any, frame: str, lane: int, their_rear: float
 ) -> None:
-    """The end of B that is nearer to A along the road is its rear, or its front in the oncoming lane."""
+    """The end of B that is nearer to A along the road is its rear, or its front in the oncoming lane.
+
+    Along the lane of A the half circle has the radius 21.75 m instead of 20 m; that of B is its own lane.
+    """
     here = on_hairpin.roads.location("1", lane, 80.0 + BEND)
     on_hairpin.add_actor("B", ResolvedPosition(on_hairpin.roads.pose(here), here))
-    found = distance(on_hairpin, "A", "B", frame=frame, kind="longitudinal", freespace=True)
-    assert found == pytest.approx(60.0 + BEND - 4.0 - their_rear)
-    found = distance(on_hairpin, "B", "A", frame=frame, kind="longitudinal", freespace=True)
-    assert abs(found) == pytest.approx(60.0 + BEND - 4.0 - their_rear)
+    for actors, own_lane in ((("A", "B"), -1), (("B", "A"), lane)):
+        bend = BEND * (1.0 - own_lane * 1.75 / 20.0) if frame == "lane" else BEND
+        gap = distance(on_hairpin, *actors, frame=frame, kind="longitudinal", freespace=True)
+        assert (gap if actors[0] == "A" else abs(gap)) == pytest.approx(60.0 + bend - 4.0 - their_rear)
 
 
 def test_free_space_along_a_trajectory_that_turns_around(on_hairpin: Any) -> None:

@@ -24,9 +24,10 @@ def test_collisions_between_sensing_stations_are_rare() -> None:
     assert reasons["half_duplex"] / len(late) == pytest.approx(0.01, abs=0.008)
 
 
-def test_half_duplex_stations_do_not_receive_while_transmitting() -> None:
+@pytest.mark.parametrize("background", [None, {"kind": "cv2x_mode4", "density": 0.05}])
+def test_half_duplex_stations_do_not_receive_while_transmitting(background: dict[str, str | float] | None) -> None:
     """Two stations with resources in the same subframe lose the messages of each other in both directions."""
-    air = Air(radio(5, **MODE_4), many(10), 0.1).run(40.0, dict.fromkeys(many(10), 1))
+    air = Air(radio(5, **MODE_4, background=background), many(10), 0.1).run(40.0, dict.fromkeys(many(10), 1))
     subframe = {(e.message.sender, e.message.number): round(1000 * e.start) for e in air.transmissions}
     sent = {(sender, start) for (sender, _), start in subframe.items()}
     for event in air.events:
