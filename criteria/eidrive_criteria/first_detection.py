@@ -15,7 +15,10 @@ from eidrive_scenario.api.criteria import Frame, Verdict
 
 
 class FirstDetectionSettings(PerceivedSettings):
-    """Settings: `{to: Incoming, by: 3.0}` with by [s]. Without `by` it only measures and passes."""
+    """Settings: `{of: Ego, to: Incoming, source: fused, by: 3.0}` with the time by [s].
+
+    Without `by` it only measures and passes.
+    """
 
     to: str
     by: Annotated[float, Field(ge=0)] | None = None

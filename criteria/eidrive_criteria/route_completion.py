@@ -13,7 +13,7 @@ from eidrive_scenario.api.criteria import Place, Verdict
 
 
 class RouteCompletionSettings(RouteSettings):
-    """Settings: `{of: Ego, at_least: 0.99}`; with `within: 10`, at most within [m] may be left."""
+    """Settings: `{of: Ego, at_least: 0.99, within: 10}` with a share, and the distance within [m] that may be left."""
 
     at_least: Annotated[float, Field(ge=0, le=1)] = 0.99
     within: Annotated[float, Field(gt=0)] | None = None

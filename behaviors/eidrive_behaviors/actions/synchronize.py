@@ -22,7 +22,7 @@ from eidrive_scenario.api.actions import (
     resolve_position,
     trajectory_of,
 )
-from eidrive_scenario.api.common import EPSILON
+from eidrive_scenario.api.common import EPSILON, LaneLocation, RoadNetwork, Route
 
 JUST_PASSED = 10.0
 """Distance behind the actor, besides that of one step, up to which it has passed its target [m]; it drives around to a
@@ -83,6 +83,8 @@ class SynchronizeAction(ActionBehaviour):
                 raise self.error(message, "specify a position that does not refer to it")
         self._moving = tuple(bool(referenced_entities(target)) for target in (own, master))
         """Whether each target moves with an entity."""
+        self._ways: dict[str, tuple[tuple[LaneLocation, LaneLocation, Route | None, float], float | None]] = {}
+        """Start, target, route and direction of each entity, and its distance along the roads [m]."""
         self._sense: float | None = None
         """-1 if the actor drives backwards, else +1; None before the first step."""
         self._mean: float | None = None
@@ -216,17 +218,30 @@ class SynchronizeAction(ActionBehaviour):
         if roads is None or start is None or target.location is None:
             return straight
         sense *= facing(self.context, name, start)
-        route = actor.motion.route
-        on_route = None if route is None else roads.distance(start, target.location, route=route, along_lane=True)
+        key = start, target.location, actor.motion.route, sense
+        if name not in self._ways or self._ways[name][0] != key:
+            self._ways[name] = key, self._along_roads(roads, key, abs(self.context.speed(name)) * self.context.dt)
+        way = self._ways[name][1]
+        return straight if way is None else way
+
+    def _along_roads(
+        self, roads: RoadNetwork, between: tuple[LaneLocation, LaneLocation, Route | None, float], step: float
+    ) -> float | None:
+        """Return the distance along the lane on a route or over the roads [m]; None if these do not lead to the target.
+
+        between  start, target, route and direction of motion;  step  way of one time step [m]
+        """
+        start, target, route, sense = between
+        on_route = None if route is None else roads.distance(start, target, route=route, along_lane=True)
         if on_route is not None:
             return on_route[0] * sense
-        shortest = roads.distance(start, target.location, along_lane=True)
+        shortest = roads.distance(start, target, along_lane=True)
         if shortest is None:
-            return straight
+            return None
         way = shortest[0] * sense
-        if way > -JUST_PASSED - abs(self.context.speed(name)) * self.context.dt:
+        if way > -JUST_PASSED - step:
             return way
-        ahead = roads.distance(start, target.location, sense=1 if sense > 0.0 else -1, along_lane=True)
+        ahead = roads.distance(start, target, sense=1 if sense > 0.0 else -1, along_lane=True)
         return way if ahead is None else abs(ahead[0])
 
     def _along(self, progress: TrajectoryProgress, name: str, position: model.Position, sense: float) -> float:

@@ -323,15 +323,13 @@ def _with_space(points: Sequence[Point], space: Sequence[Axis]) -> Sequence[Poin
 
 
 def _check_names_of_runs(scenario: Path, points: Sequence[Point], settings: RunSettings, is_distribution: bool) -> None:
-    """Raise SettingError if an axis has the name of the runs of a distribution, or of a setting of all runs.
+    """Raise SettingError if an axis has the name of the runs of a distribution, or of a parameter of all runs.
 
     So does an axis or a setting of all runs with the name of a parameter that the distribution varies.
     """
     names = dict.fromkeys(name for point in points for name in point)
     for name in names:
         parameter = name.removeprefix(PARAMETER)
-        if name in SETTINGS and getattr(settings, name) != getattr(RunSettings(), name):
-            raise SettingError(Diagnostic(f"RunSettings.{name}: --vary varies this setting", "remove the option"))
         if not is_setting(name) and parameter in settings.parameters:
             text = f"RunSettings.parameters: --vary varies parameter {parameter!r}"
             raise SettingError(Diagnostic(text, "remove the option"))
