@@ -173,5 +173,5 @@ def test_relative_position_in_the_next_lane_section_follows_lane_links(
         "Other", teleport_xml(f'<RelativeLanePosition entityRef="Ego" {offsets}/>')
     )
     played = run(0.1, ("Ego", NOTHING), driven=False, others={"Other": (-1, 10.0, 0.0)}, street=OPENING, init=init)
-    row = played.frames[0].view.rows["Other"]
-    assert played.frames[0].view.position[row, :2].tolist() == pytest.approx(expected)
+    view = played.frames[0].view
+    assert view.position[view.row("Other"), :2].tolist() == pytest.approx(expected)
