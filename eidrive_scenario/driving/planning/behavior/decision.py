@@ -537,7 +537,10 @@ class Decider:
                 # A new profile has no place with a view if the vehicle is at that of the current one.
                 places = (profile.waits_at, math.inf if self._current is None else self._current.waits_at)
                 has_view = any(situation.steered[0] - NEAR_PLACE < place < math.inf for place in places)
-                is_free = self._oncoming.yields(outlook, viewpoint, is_last_place=True, has_view=has_view)
+                until_border = self._oncoming.until_border(profile, motion)
+                is_free = self._oncoming.yields(
+                    outlook, viewpoint, is_last_place=True, has_view=has_view, until_border=until_border
+                )
                 verdict = Verdict.GO if is_free else verdict
         elif verdict is Verdict.FOLLOW:
             if self._oncoming.yields(outlook, viewpoint, is_last_place=False, has_view=True):

@@ -37,8 +37,8 @@ LONG, LONGEST = 2, 4
 """Number of pauses without oncoming traffic after which the vehicle relies on others to respond; and after which it
 begins behind a standing object from where it does not see far enough: it would wait forever. A choice."""
 RARE, MOST_HEADWAYS = 0.025, 2.0
-"""Probability up to which a further vehicle is not expected, and maximum of the headway from which on it is that small
-over the longest one until then: few say little about the next one."""
+"""Probability up to which a further vehicle is not expected, and maximum for each pause of the headway from which on it
+is that small over the longest one until then: few say little about the next one."""
 LEAST_HEADWAY = 1.0
 """Difference between expected arrivals that belong to different vehicles [s]."""
 SLOWEST = 0.5
@@ -187,12 +187,12 @@ class OncomingTraffic:
         uniformly distributed headways up to an unknown limit, the next one is longer than x times the longest one with
         the probability x**-n / (n + 1).
         """
-        pause = PAUSE
+        pause = pauses * PAUSE
         if self._headways:
-            longer = min(max(((self._headways + 1) * RARE) ** (-1.0 / self._headways), 1.0), MOST_HEADWAYS)
+            longer = max(((self._headways + 1) * RARE) ** (-1.0 / self._headways), 1.0)
             in_view = float(self._ahead[-1]) / max(self._usual, ONCOMING_SPEED)
-            pause = max(PAUSE, longer * self._longest_headway - in_view)
-        return self._quiet(now) >= pauses * pause
+            pause = max(pause, min(longer, pauses * MOST_HEADWAYS) * self._longest_headway - in_view)
+        return self._quiet(now) >= pause
 
     def _quiet(self, now: float) -> float:
         """Return the time for which the vehicle has waited without oncoming traffic in view [s]."""
@@ -276,7 +276,10 @@ class OncomingTraffic:
         refused = held if first or (is_at_border and waits and not moves) else Verdict.GIVE_UP
         end, until = return_s + body.front, back if is_current else back + RESERVE
         traffic = self._traffic(profile, motion, scene, first)
-        if math.isinf(back) or self._meets(scene, traffic, until, end):
+        if math.isinf(back):
+            return refused
+        if self._meets(scene, traffic, until, end):
+            self._others_yield = False  # Traffic has come into view: the pauses restart.
             return refused
         if last < 0 and has_begun:
             return Verdict.GO  # The point of no return has passed, and nothing is in view.
@@ -310,22 +313,40 @@ class OncomingTraffic:
             before, observer = number, s
         return Verdict.GO
 
-    def yields(self, outlook: Outlook, viewpoint: tuple[float, float], *, is_last_place: bool, has_view: bool) -> bool:
+    def until_border(self, profile: LateralProfile, motion: Motion) -> float:
+        """Return the time for which a vehicle that goes out along a profile can still stop in its lane [s]."""
+        places = motion.s + motion.speed**2 / (2.0 * BRAKING) + motion.speed * DELAY
+        outside: Bools = profile.side * profile.offset(places + self._body.wheelbase) > profile.border
+        return float(self._times[max(int(outside.argmax()) - 1, 0)])
+
+    def yields(
+        self,
+        outlook: Outlook,
+        viewpoint: tuple[float, float],
+        *,
+        is_last_place: bool,
+        has_view: bool,
+        until_border: float = 0.0,
+    ) -> bool:
         """Return whether a vehicle that has waited in vain for a view may begin, since traffic that comes into view can
         stop before it.
 
         is_last_place  whether there is no other place to wait at
         has_view       whether the vehicle waits at a place with a view, where it waits longer
+        until_border   time for which it can still stop in its lane after it began [s]: after the first pause, it begins
+                       that much earlier
         """
         hidden = self.first_hidden(outlook, viewpoint)
         front = viewpoint[0] + self._body.half_length
-        has_waited_long = self._is_patient(outlook.now, LONG)
+        at_border = outlook.now + until_border
+        has_waited_long = self._is_patient(at_border, LONG)
         way = approach(self._usual, math.inf)
         if has_waited_long:
             way = approach(min(self._usual, self._wanted), math.inf, HARD_RESPONSE)
-        is_patient = has_waited_long or (is_last_place and not has_view and self._is_patient(outlook.now))
-        waits_in_vain = is_last_place and self._is_patient(outlook.now, LONGEST)
-        self._others_yield = waits_in_vain or (is_patient and hidden - way >= front)
+        is_patient = has_waited_long or (is_last_place and not has_view)
+        waits_in_vain = is_last_place and self._is_patient(at_border, LONGEST)
+        begins = waits_in_vain or (is_patient and hidden - way >= front)
+        self._others_yield = begins and self._is_patient(outlook.now)
         return self._others_yield
 
     def _suffices(self, hidden: float, viewpoint: float, duration: float, end: float, outlook: Outlook) -> bool:

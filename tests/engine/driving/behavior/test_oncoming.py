@@ -126,7 +126,7 @@ def test_traffic_beside_three_lanes_of_the_own_direction_restarts_the_pause() ->
 @pytest.mark.parametrize(
     ("headways", "longest"),
     # After n headways up to 12 s, 97.5 % of the next ones are shorter than 12 s ((n + 1) 0.025)^(-1/n), the predictive
-    # distribution of the uniform one with an unknown limit; after one, the wait is bounded.
+    # distribution of the uniform one with an unknown limit; after few, the wait is bounded.
     [(1, 24.0), (3, 24.0), (5, 17.54), (9, 14.0)],
 )
 def test_pause_is_longer_after_vehicles_with_long_headways(headways: int, longest: float) -> None:
@@ -138,6 +138,11 @@ def test_pause_is_longer_after_vehicles_with_long_headways(headways: int, longes
         observed.observe(scene(*cars), 0.0, 10.0, float(now), held_up=True)
     assert observed.hidden_speed(BESIDE, end + longest - 8.0 - 0.3) == 15.0
     assert observed.hidden_speed(BESIDE, end + longest - 8.0 + 0.3) == 10.0
+    # Two pauses: 12 s, or as long as the 97.5 %, with twice the bound.
+    longer = max({1: 48.0, 3: 25.85}.get(headways, longest) - 8.0, 2.0 * PAUSE)
+    for quiet, expected in ((longer - 0.3, False), (longer + 0.3, True)):
+        outlook = Outlook(LINE, scene(), BESIDE, end + quiet)
+        assert observed.yields(outlook, (1.4, 0.0), is_last_place=True, has_view=True) is expected
 
 
 def test_column_with_short_headways_does_not_lengthen_the_pause() -> None:
@@ -314,13 +319,41 @@ def test_vehicle_without_any_view_begins_after_two_long_pauses(is_last_place: bo
         assert waiting.yields(outlook, (1.4, 0.0), is_last_place=is_last_place, has_view=False) is expected
 
 
-@pytest.mark.parametrize(("has_view", "since"), [(False, PAUSE), (True, 2.0 * PAUSE)])
-def test_vehicle_with_a_view_relies_on_others_after_two_pauses(has_view: bool, since: float) -> None:
+@pytest.mark.parametrize(
+    ("has_view", "until_border", "since"),
+    [(False, 0.0, PAUSE), (True, 0.0, 2.0 * PAUSE), (True, 2.5, 2.0 * PAUSE - 2.5), (True, 8.0, PAUSE)],
+)
+def test_vehicle_with_a_view_relies_on_others_after_two_pauses(
+    has_view: bool, until_border: float, since: float
+) -> None:
     """Within 100 m traffic at 10 m/s, which needs 10 m + 100 / 6 m, can stop."""
     waiting = traffic(100.0)
     for now, expected in ((since - 0.1, False), (since, True)):
         outlook = Outlook(LINE, scene(), BESIDE, now)
-        assert waiting.yields(outlook, (1.4, 0.0), is_last_place=True, has_view=has_view) is expected
+        begins = waiting.yields(outlook, (1.4, 0.0), is_last_place=True, has_view=has_view, until_border=until_border)
+        assert begins is expected
+
+
+def test_vehicle_can_stop_in_its_lane_until_its_braking_ends_beyond_it() -> None:
+    """The stop of 10 m/s · 0.3 s + 16.7 m from 30 m before the profile ends at 4.4 m after 1.47 s; times are 0.25 s
+    apart."""
+    motion = Motion(-30.0 + 10.0 * TIMES, np.full(len(TIMES), 10.0))
+    assert traffic(100.0).until_border(PASSING, motion) == 1.25
+    assert traffic(100.0).until_border(PASSING, Motion(motion.s + 20.0, motion.speed)) == 0.0
+
+
+def test_pauses_restart_if_traffic_comes_into_view() -> None:
+    waiting = traffic(60.0)
+    motion = Motion(-20.0 + 10.0 * TIMES, np.full(len(TIMES), 10.0))
+    truck, car = (40.0, 0.0, 0.0), (35.0, 3.5, -10.0)
+    outlook = Outlook(LINE, scene(truck), BESIDE, 2.0 * PAUSE)
+    assert waiting.yields(outlook, (-18.6, 0.0), is_last_place=True, has_view=True)
+    assert waiting.verify(PASSING, motion, outlook, is_current=True, has_begun=True) is Verdict.GO
+    waiting.observe(scene(truck, car), -18.6, 10.0, 2.0 * PAUSE + 0.1, held_up=True, oncoming=3.5)
+    with_car = Outlook(LINE, scene(truck, car), BESIDE, 2.0 * PAUSE + 0.1)
+    assert waiting.verify(PASSING, motion, with_car, is_current=True, has_begun=True) is Verdict.WAIT
+    afterwards = Outlook(LINE, scene(truck), BESIDE, 2.0 * PAUSE + 6.0)
+    assert waiting.verify(PASSING, motion, afterwards, is_current=True, has_begun=True) is Verdict.WAIT
 
 
 @pytest.mark.parametrize("kind", ["bidirectional", "driving"])
