@@ -168,9 +168,16 @@ def worker_context() -> BaseContext:
 def start_server() -> None:
     """Start the server of worker processes, which imports while this process prepares the jobs."""
     if worker_context().get_start_method() == FORKSERVER:
-        from multiprocessing import forkserver
+        from multiprocessing import forkserver, resource_tracker
 
-        forkserver.ensure_running()
+        # The server inherits the mask: it ends with this process, without a traceback if that is interrupted.
+        # The tracker, which it starts otherwise, resets the mask.
+        resource_tracker.ensure_running()
+        masked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            forkserver.ensure_running()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, masked)
 
 
 R = TypeVar("R")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib
 import re
 import signal
+import subprocess
+import sys
 from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
@@ -107,6 +109,27 @@ def test_second_interrupt_does_not_interrupt_the_end(number: signal.Signals, def
         assert signal.getsignal(number) is default
     finally:
         signal.signal(number, before)
+
+
+INTERRUPTED_START = """
+import os, signal, time
+from eidrive_scenario.experiments.sweeps.workers import start_server
+signal.signal(signal.SIGINT, signal.default_int_handler)
+start_server()
+time.sleep(0.3)  # The server imports meanwhile.
+try:
+    os.killpg(0, signal.SIGINT)
+    time.sleep(10.0)
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+def test_server_that_is_interrupted_while_it_starts_prints_nothing() -> None:
+    """A terminal sends the signal to the server, too."""
+    command = [sys.executable, "-c", INTERRUPTED_START]
+    ended = subprocess.run(command, capture_output=True, text=True, start_new_session=True, timeout=60)
+    assert (ended.stdout, ended.stderr) == ("interrupted\n", "")
 
 
 def test_unwritable_folder_of_a_run_is_aborted_and_repeatable(scenario: Path, tmp_path: Path) -> None:
