@@ -215,6 +215,11 @@ def test_vehicles_of_sumo_are_on_the_surface_of_hills(run: Run) -> None:
 
 
 @needs_sumo
+def test_comments_between_routes_have_no_effect(crossing: Callable[..., RecordedRun]) -> None:
+    assert "sumo.east" in crossing(f"<!-- by randomTrips --><?editor?>{EAST}", 1.0).frames[-1].view.names
+
+
+@needs_sumo
 @pytest.mark.parametrize(
     ("routes", "expected"),
     [

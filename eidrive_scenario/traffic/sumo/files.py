@@ -91,7 +91,7 @@ def _read(path: Path, kind: str) -> tuple[bytes, etree._Element]:
     except OSError as error:
         hint = f"give the path of a file with the root <{kind}>"
         raise SettingError(Diagnostic(f"cannot read {quoted(str(path))}: {reason_of(error)}", hint)) from error
-    root = parse_untrusted(content, str(path), LIMITS, SettingError)
+    root = parse_untrusted(content, str(path), LIMITS, SettingError, remove_comments=True)
     if root.tag != kind:
         message = f"the root element is {root.tag} (expected {kind})"
         raise SettingError(Diagnostic(message, "check the kind of the file", str(path), line_of(root)))
