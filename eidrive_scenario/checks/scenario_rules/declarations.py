@@ -55,8 +55,8 @@ def _used(root: etree._Element) -> set[str]:
                 used.add(value.removeprefix("$"))
             if "$" in value:
                 used.update(REFERENCE.findall(value))
-        if node.text and not node.text.isspace():
-            used.update(WORD.findall(node.text))
+    for text in cast(list[str], root.xpath("descendant-or-self::text()")):
+        used.update(WORD.findall(text))
     return used
 
 
