@@ -227,6 +227,8 @@ def test_comments_between_routes_have_no_effect(crossing: Callable[..., Recorded
         ('<vType id="t"><param key="has.ssm.device" value="true"/></vType>', "SUMO writes files by the parameter"),
         ('<vType id="\x9b"/>', r"the id '\\x9b' has control characters"),
         ('<trip id="a" depart="2"/><trip id="b" depart="1"/>', "the departure at 1 s is after one at 2 s"),
+        ('<trip depart="0:1:30"/><trip depart="0:00:02.5"/>', "the departure at 2.5 s is after one at 90 s"),
+        ('<trip depart="1:0:0:5"/><flow begin="24:00:04"/>', "the departure at 86404 s is after one at 86405 s"),
         ("</routes><routes>", "not well-formed XML"),
     ],
 )

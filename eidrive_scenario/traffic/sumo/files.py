@@ -30,6 +30,8 @@ LANES = 400
 """Maximum number of lanes whose position is compared with the roads of the scenario."""
 MATCHING = 0.5
 """Minimum share of them on the roads."""
+_UNITS = (1.0, 60.0, 3600.0, 86400.0)
+"""Units of the parts of a time such as D:H:M:S, from the last one [s]."""
 _WRITING = ("has.", "device.", "file")
 """Starts of the keys of parameters by which SUMO writes files."""
 
@@ -117,7 +119,8 @@ def _check_order(root: etree._Element, source: str) -> None:
     for element in root:
         stated = element.get("depart", element.get("begin", ""))
         with suppress(ValueError):  # such as "triggered"
-            time = float(stated)
+            parts = map(float, reversed(stated.split(":")))
+            time = sum(unit * part for unit, part in zip(_UNITS, parts, strict=False))
             if time < latest:
                 message = f"the departure at {time:g} s is after one at {latest:g} s; SUMO would ignore it"
                 raise SettingError(Diagnostic(message, "sort the file by departure", source, line_of(element)))
