@@ -170,6 +170,17 @@ def test_signals_follow_sumo_where_the_scenario_sets_none(crossing: Callable[...
 
 
 @needs_sumo
+def test_signal_of_several_links_has_the_most_restrictive_state(run: Run, crossing: Callable[..., RecordedRun]) -> None:
+    """Signal 30 is that of the links 0 to 3, of which the first one differs: red for 1 s, then yellow for 1 s."""
+    network = (DATA / "four_way_signals.net.xml").read_text()
+    phase = '<phase duration="42" state="GGGgrrrrGGGgrrrr"/>'
+    split = "".join(phase.replace("42", "1").replace("GGGg", f"{letter}GGg", 1) for letter in "ryG")
+    (run.folder / "split.net.xml").write_text(network.replace(phase, split))
+    played = crossing(EAST, 2.9, init=command("split.net.xml"))
+    assert [played.frames[tick].signals["30"] for tick in (10, 30, 50)] == ["red", "yellow", "green"]
+
+
+@needs_sumo
 def test_runs_repeat_and_end_sumo(crossing: Callable[..., RecordedRun]) -> None:
     random = '<flow id="f" type="DEFAULT_VEHTYPE" begin="0" end="20" probability="0.4" from="-1" to="-2"/>'
     first, second, other = (crossing(random, seed=seed).result.trace_hash for seed in (3, 3, 4))

@@ -47,7 +47,8 @@ BODIES = {
 """Category of the body of a class of SUMO; all other classes have that of a car."""
 _PEDESTRIAN = ActorSpec("", "pedestrian", "pedestrian", (0.5, 0.5, 1.7), (0.0, 0.0, 0.85))
 _STATES = {"r": RED, "s": RED, "u": f"{RED} {YELLOW}", "y": YELLOW, "g": GREEN, "G": GREEN, "o": f"flashing {YELLOW}"}
-"""State of a signal by the letter of SUMO; off for all others."""
+"""State of a signal by the letter of SUMO, the most restrictive first; off for all others."""
+_LEAST_RESTRICTIVE_FIRST = "".join(reversed(_STATES))
 
 
 class SignalStates(Protocol):
@@ -74,7 +75,10 @@ class TrafficLight:
         self._is_led = False
 
     def exchange(self) -> None:
-        """Take over the states of the signals if the scenario has set one of them, otherwise set them."""
+        """Take over the states of the signals if the scenario has set one of them, otherwise set them.
+
+        A signal of several links has the state of the most restrictive one.
+        """
         states = self._signals.states
         own = {signal: states[signal] for signal in self._links.values() if signal in states}
         if own != self._published:
@@ -88,7 +92,8 @@ class TrafficLight:
             if "".join(wanted) != shown:
                 self._lights.setRedYellowGreenState(self._name, "".join(wanted))
             return
-        published = {signal: _STATES.get(shown[link], OFF) for link, signal in self._links.items()}
+        by_restriction = sorted(self._links, key=lambda link: _LEAST_RESTRICTIVE_FIRST.find(shown[link]))
+        published = {self._links[link]: _STATES.get(shown[link], OFF) for link in by_restriction}
         for signal, state in published.items():
             if self._published.get(signal) != state:
                 self._signals.set_state(signal, state)
