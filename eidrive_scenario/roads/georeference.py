@@ -36,9 +36,14 @@ DATUMS: Mapping[str, tuple[str, str]] = {
 CARLA_RADIUS = 6_378_137.0
 """Radius of CARLA's sphere [m]."""
 
-_ANGLES = ("lat_0", "lon_0", "lat_1", "lat_2", "lat_ts", "lonc", "alpha", "gamma")
+_ANGLES = ("lat_0", "lon_0", "lat_1", "lon_1", "lat_2", "lon_2", "lat_ts", "lonc", "alpha", "gamma")
 _SCALE_AND_ORIGIN = ("k", "k_0", "x_0", "y_0")
-_ELLIPSOID_NUMBERS = ("R", "a", "b", "rf")
+_VARIANTS = ("no_uoff", "no_off", "no_rot", "guam", "hyperbolic", "czech", "approx")
+"""Parameters without a value that select a variant of a projection."""
+_ELLIPSOID_NUMBERS = ("R", "a", "b", "rf", "f", "es", "e")
+_SPHERES = ("R_A", "R_V", "R_a", "R_g", "R_h")
+_SPHERE_LATITUDES = ("R_lat_a", "R_lat_g")
+"""Parameters that replace the ellipsoid by a sphere, without a value or with a latitude."""
 _HELMERT = ("x", "y", "z", "rx", "ry", "rz", "s")
 
 
@@ -143,7 +148,8 @@ def _pipeline(given: Mapping[str, str]) -> str:
         if not 1.0 <= zone <= 60.0:
             raise ValueError(f"<geoReference>: zone is {given.get('zone', 'missing')!r} (expected 1 to 60)")
         numbers = [f"+zone={int(zone)}", *(["+south"] if "south" in given else [])]
-    return " ".join(("+proj=pipeline", *_shift_steps(shift, ellipsoid), f"+step +proj={name}", ellipsoid, *numbers))
+    step = (f"+step +proj={name}", ellipsoid, *numbers, *(f"+{key}" for key in _VARIANTS if key in given))
+    return " ".join(("+proj=pipeline", *_shift_steps(shift, ellipsoid), *step))
 
 
 def _shift_steps(shift: tuple[float, ...], ellipsoid: str) -> tuple[str, ...]:
@@ -179,7 +185,9 @@ def _datum(given: Mapping[str, str]) -> tuple[str, tuple[float, ...]]:
         values = (math.nan,)
     if values and not (len(values) in (3, 7) and all(map(math.isfinite, values))):
         raise ValueError(f"<geoReference>: towgs84 is invalid (got {shift[:60]!r}; expected 3 or 7 numbers)")
-    return " ".join([*([f"+ellps={name}"] if name else []), *numbers]), values
+    spheres = [f"+{key}={_number(given, key)!r}" for key in _SPHERE_LATITUDES if key in given]
+    spheres += [f"+{key}" for key in _SPHERES if key in given]
+    return " ".join([*([f"+ellps={name}"] if name else []), *numbers, *spheres]), values
 
 
 def _number(given: Mapping[str, str], name: str) -> float:

@@ -38,6 +38,20 @@ def plane(text: str, latitude: float, longitude: float) -> tuple[float, float]:
             " +x_0=609601.21920 +y_0=0 +ellps=clrk66",
             *(28.5, -96.0, 2963503.91 * 0.30480061, 254759.80 * 0.30480061, 0.02),
         ),
+        # the same: Hotine oblique Mercator, Timbalai 1948 / RSO Borneo, origin at the natural origin (variant A)
+        (
+            "+proj=omerc +lat_0=4 +lonc=115 +alpha=53.315820472222 +gamma=53.130102361111 +k=0.99984 +no_uoff"
+            " +a=6377298.556 +f=0.003324449296663",
+            *(5.387253583333, 115.805505444444, 679245.73, 596562.78, 0.01),
+        ),
+        # and at the center of the projection (variant B)
+        (
+            "+proj=omerc +lat_0=4 +lonc=115 +alpha=53.315820472222 +gamma=53.130102361111 +k=0.99984 +x_0=590476.87"
+            " +y_0=442857.65 +a=6377298.556 +rf=300.8017",
+            *(5.387253583333, 115.805505444444, 679245.73, 596562.78, 0.01),
+        ),
+        # Moritz, Geodetic Reference System 1980 (Journal of Geodesy 74, 2000): radius of the sphere of equal surface
+        ("+proj=merc +ellps=GRS80 +R_A", 0.0, 45.0, 6371007.1810 * math.pi / 4, 0.0, 1e-3),
         # PROJ 9.5
         ("+proj=utm +zone=32 +datum=WGS84", 48.0, 11.0, 649187.87496, 5318235.61388, 1e-4),
         ("EPSG:32633", -20.0, 15.0, 500000.0, -2211481.30767, 1e-4),
@@ -57,6 +71,19 @@ def test_plane_of_known_points_matches_their_sources(
     text: str, latitude: float, longitude: float, x: float, y: float, tolerance: float
 ) -> None:
     assert plane(text, latitude, longitude) == pytest.approx((x, y), abs=tolerance)
+
+
+@pytest.mark.parametrize("shape", ["f=0.00335281068118", "es=0.00669438002290", "e=0.0818191910428"])
+def test_ellipsoid_by_flattening_or_eccentricity_is_that_of_its_name(shape: str) -> None:
+    """Moritz (2000) gives the flattening and the squared eccentricity of GRS 80."""
+    numbers, name = (f"+proj=tmerc +lat_0=48 +lon_0=11 {form}" for form in (f"+a=6378137 +{shape}", "+ellps=GRS80"))
+    assert plane(numbers, 49, 12) == pytest.approx(plane(name, 49, 12), abs=1e-4)
+
+
+def test_oblique_projection_by_two_points_has_its_axis_through_them() -> None:
+    """With the origin of x and y on the axis, and x along it, both points have y = 0."""
+    text = "+proj=omerc +lat_0=48 +lat_1=47 +lon_1=8 +lat_2=49 +lon_2=14 +no_rot +ellps=GRS80"
+    assert [plane(text, *point)[1] for point in ((47, 8), (49, 14))] == pytest.approx([0.0, 0.0], abs=1e-6)
 
 
 def test_projection_at_its_origin_gives_false_coordinates() -> None:
