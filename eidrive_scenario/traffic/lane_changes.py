@@ -109,6 +109,8 @@ class LaneChanges:
         some, room, able = np.tile(indices, 2), np.tile(room, 2), np.tile(able, 2)
         possible = np.flatnonzero(able & (target >= 0))
         possible = possible[lanes.ends_at[target[possible]] - cars.progress[some[possible]] > room[possible]]
+        own, length = some[possible], room[possible]
+        possible = possible[lanes.may_cross(cars.lane[own], target[possible], cars.progress[own], length)]
         if not possible.size:
             return []
         some, target, slow_side = some[possible], target[possible], slow_side[possible]

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from eidrive_scenario.base.arrays import Array, Integers
+from eidrive_scenario.base.arrays import Array, Bools, Integers
 from eidrive_scenario.roads import LaneLocation, RoadNetwork
 from eidrive_scenario.roads.model.location import LaneKey
 from eidrive_scenario.traffic.cars import PLANNED
@@ -25,7 +25,7 @@ WALKABLE = frozenset(("sidewalk", "walking"))
 class TrafficLanes:
     """Lanes by the running numbers of `RoadNetwork.tables`; progress u runs from 0 to `length` in driving direction.
 
-    left, right                neighbor of the same direction to which the marking permits a change, -1 if there is none
+    left, right                neighbor of the same direction to which a marking permits a change, -1 if there is none
     beside_left, beside_right  neighbor of the same direction with any marking
     following                  successors with the same kind of users, in the order of the map
     onward, backward           first successor and first predecessor, -1 if there is none
@@ -51,6 +51,8 @@ class TrafficLanes:
         self.following: list[list[int]] = []
         self._link()
         self.left, self.right, self.beside_left, self.beside_right = (np.full(len(self.keys), -1) for _ in range(4))
+        self._solid: dict[tuple[int, int], list[tuple[float, float]]] = {}
+        """Begin and end [m] of the stretches where a marking forbids changes from a lane to a neighbor."""
         self._join_neighbors()
         self.ends_at = np.full(len(self.keys), np.inf)
         self._find_ends()
@@ -90,23 +92,42 @@ class TrafficLanes:
                     same = self.direction[left] == self.direction[right]
                     if not (same and self.tables.lane_drivable[left] and self.tables.lane_drivable[right]):
                         continue
-                    to_right, to_left = self._may_cross(left, right)
+                    to_right, to_left = self._forbidden(left, right)
                     if self.direction[left] < 0:
                         left, right, to_right, to_left = right, left, to_left, to_right
                     self.beside_right[left], self.beside_left[right] = right, left
-                    self.right[left], self.left[right] = (right if to_right else -1), (left if to_left else -1)
+                    changes = (left, right, self.right, to_right), (right, left, self.left, to_left)
+                    for lane, other, side, solid in changes:
+                        if sum(end - begin for begin, end in solid) < self.lengths[lane]:
+                            side[lane] = other
+                            self._solid[lane, other] = solid
 
-    def _may_cross(self, left: int, right: int) -> tuple[bool, bool]:
-        """Return whether the marking permits changes from lane `left` to lane `right` at its right, and back.
+    def _forbidden(self, left: int, right: int) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
+        """Return the stretches where a marking forbids changes from lane `left` to lane `right` at its right, and back.
 
         It is the marking on the outer edge of the lane nearer to lane 0. `increase` permits changes to the higher id.
         """
         numbers = self.keys[left].lane, self.keys[right].lane
         between = self.tables.roads[self.road[left]].sections[self.keys[left].section].lanes
         edge = 0 if numbers[0] > 0 > numbers[1] else min(numbers, key=abs)
-        marks = between[edge].road_marks
-        rule = marks[0].lane_change if marks else "both"
-        return rule not in ("increase", "none"), rule not in ("decrease", "none")
+        marks, length = between[edge].road_marks, self.lengths[left]
+        to_right: list[tuple[float, float]] = []
+        to_left: list[tuple[float, float]] = []
+        for mark, end in zip(marks, [*(mark.s_offset for mark in marks[1:]), length], strict=False):
+            ends = min(max(mark.s_offset, 0.0), length), min(max(end, 0.0), length)
+            stretch = ends if self.direction[left] > 0 else (length - ends[1], length - ends[0])
+            to_right += [stretch] if mark.lane_change in ("increase", "none") else []
+            to_left += [stretch] if mark.lane_change in ("decrease", "none") else []
+        return to_right, to_left
+
+    def may_cross(self, lane: Integers, other: Integers, progress: Array, length: Array) -> Bools:
+        """Return whether markings permit changes from lanes to neighbors (N,) everywhere over a length (N,) [m]."""
+        cases = zip(lane.tolist(), other.tolist(), progress.tolist(), (progress + length).tolist(), strict=True)
+        permitted = [
+            not any(begin < last and first < end for begin, end in self._solid[before, after])
+            for before, after, first, last in cases
+        ]
+        return np.array(permitted, dtype=bool)
 
     def _find_ends(self) -> None:
         """Store the ends of lanes beside others: where they become too narrow, where they merge into the successor of a

@@ -112,6 +112,28 @@ def test_solid_marking_prevents_lane_change() -> None:
         assert lane_after_one_step(queue(street(mark=mark), LaneChanger(), leader_gap=100.0)) == lane
 
 
+@pytest.mark.parametrize(
+    ("rule", "begin", "end", "after"),
+    [
+        *(("RHT", 600, 700, -2), ("RHT", 560, 700, -1), ("RHT", 530, 540, -1), ("RHT", 0, 490, -2)),
+        *(("LHT", 300, 400, -2), ("LHT", 300, 440, -1), ("LHT", 460, 470, -1), ("LHT", 510, 600, -2)),
+    ],
+)
+def test_solid_stretch_of_a_marking_prevents_changes_that_reach_it(
+    rule: str, begin: float, end: float, after: int
+) -> None:
+    """A change at 20 m/s lasts 4 s: it reaches from s = 500 m to 580 m, in left-hand traffic against s to 420 m."""
+    marks = "".join(
+        f'<roadMark sOffset="{s}" type="solid" laneChange="{change}"/>'
+        for s, change in ((0, "both"), (begin, "none"), (end, "both"))
+    )
+    lanes = section_xml(right=lane_xml(-1, more=marks) + lane_xml(-2))
+    roads = RoadNetwork.parse(map_xml(road_xml(length=1000.0, lanes=lanes, rule=rule)))
+    fleet = Fleet(roads, changer=LaneChanger(bias=0.3))
+    add_car(fleet, car("me"), roads.location("1", -1, 500.0), speed=20.0, desired_speed=20.0)
+    assert lane_after_one_step(fleet) == after
+
+
 def test_car_does_not_change_to_oncoming_lane() -> None:
     roads = street(1, 1)
     fleet = Fleet(roads)
