@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +21,7 @@ from eidrive_scenario.pytest_plugin.failures import (
     add_section,
     explain_outcome,
 )
-from eidrive_scenario.pytest_plugin.markers import keywords, run_markers, test_name
+from eidrive_scenario.pytest_plugin.markers import distinct_test_names, keywords, run_markers
 from eidrive_scenario.pytest_plugin.option_values import path_beside
 from eidrive_scenario.pytest_plugin.outcome import run_and_report
 from eidrive_scenario.pytest_plugin.variants import MarkerSettings, RunVariant, run_variants
@@ -78,12 +77,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         raise pytest.fail.Exception(f"{metafunc.definition.nodeid}: {error}", pytrace=False) from None
     variants = list(run_variants(metafunc.config, channels, seeds, added, rate))
     config = metafunc.config
-    names = {path: test_name(config, path, all_folders=False) for path in paths}
-    count = Counter(names.values())
+    names = distinct_test_names(config, paths)
     cases = [
         pytest.param(
             (path, variant),
-            id=f"{test_name(config, path, all_folders=count[names[path]] > 1)}-{variant}",
+            id=f"{names[path]}-{variant}",
             marks=tuple(run_markers(config, path, variant.selectors, None)),
         )
         for path in paths

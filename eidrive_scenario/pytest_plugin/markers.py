@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 import re
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -56,9 +60,30 @@ def test_name(config: pytest.Config, path: Path, *, all_folders: bool) -> str:
 
     The name has the folder of the file, or all folders, without the root, whose name differs between checkouts.
     """
-    below = path.relative_to(config.rootpath) if path.is_relative_to(config.rootpath) else path
+    below = _below_root(config, path)
     folders = below.parent.parts if all_folders else below.parent.parts[-1:]
     return "/".join(re.sub(r"[^\w.+=,~-]+", "_", part) for part in (*folders, path.stem))
+
+
+def distinct_test_names(config: pytest.Config, paths: Iterable[Path]) -> dict[Path, str]:
+    """Return the parts of the names of one test that its scenario files have.
+
+    Files of equal names have all folders, and if they differ in replaced characters only, a hash of their paths.
+    """
+
+    def hashed(path: Path) -> str:
+        digest = hashlib.sha256(os.fsencode(_below_root(config, path).as_posix())).hexdigest()
+        return f"{test_name(config, path, all_folders=True)}-{digest[:8]}"
+
+    names = {path: test_name(config, path, all_folders=False) for path in paths}
+    for longer in (partial(test_name, config, all_folders=True), hashed):
+        count = Counter(names.values())
+        names = {path: longer(path) if count[name] > 1 else name for path, name in names.items()}
+    return names
+
+
+def _below_root(config: pytest.Config, path: Path) -> Path:
+    return path.relative_to(config.rootpath) if path.is_relative_to(config.rootpath) else path
 
 
 def run_markers(
@@ -73,7 +98,7 @@ def run_markers(
     family = family_of(path)
     if family:
         yield _marker(config, family, f"scenarios in folders named {path.parent.name}")
-    file = path.relative_to(config.rootpath) if path.is_relative_to(config.rootpath) else path
+    file = _below_root(config, path)
     is_slow = "rate" in selectors or any(fnmatchcase(file.as_posix(), pattern) for pattern in config.getini(_INI_SLOW))
     if is_slow and family != "slow":
         yield pytest.mark.slow

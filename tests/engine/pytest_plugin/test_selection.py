@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import shutil
 from pathlib import Path
 
@@ -70,6 +71,24 @@ def test_files_of_equal_folder_and_name_are_named_by_all_folders(project: pytest
         expected.add(f"test_drive[xosc/{town}/near/drive-seed=1]")
         names = collected(project, "test_files_of_equal_folder_and_name_are_named_by_all_folders.py")
         assert set(names) == expected
+
+
+def test_files_that_differ_in_replaced_characters_have_hashes_of_their_paths(project: pytest.Pytester) -> None:
+    project.makepyfile(
+        """
+        import pytest
+
+        @pytest.mark.scenario("xosc/near/a*.xosc")
+        def test_drive(run_scenario):
+            run_scenario()
+        """
+    )
+    expected = set()
+    for name in ("a_b", "a b", "a!b"):
+        shutil.copy(PASSING_BY, project.path / f"xosc/near/{name}.xosc")
+        digest = hashlib.sha256(f"xosc/near/{name}.xosc".encode()).hexdigest()[:8]
+        expected.add(f"test_drive[xosc/near/a_b-{digest}-seed=1]")
+    assert set(collected(project)) == expected
 
 
 def test_keyword_expression_selects_settings_of_python_tests(project: pytest.Pytester) -> None:
