@@ -54,7 +54,7 @@ def parse_road_map(text: bytes, source: str) -> RoadMap:
         if number in roads:
             collector.report_error(element, f"road {number!r} occurs twice", "give each road a unique id")
         roads[number] = _read_road(number, element, collector)
-        objects.extend(read_object(number, child, collector) for child in element.iterfind("objects/object"))
+        objects.extend(read_object(roads[number], child, collector) for child in element.iterfind("objects/object"))
     if not elements:
         collector.report_error(root, "<OpenDRIVE> has no <road>", "add at least one")
     junctions = {}

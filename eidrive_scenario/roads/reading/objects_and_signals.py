@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 
 from lxml import etree
 from msgspec.structs import replace
 
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.roads.geometry.poses import BEYOND
 from eidrive_scenario.roads.model.map_warnings import MapRule
 from eidrive_scenario.roads.model.road_map import (
@@ -121,7 +123,7 @@ def read_controllers(
     return controllers
 
 
-def read_object(road: str, element: etree._Element, collector: AttributeReader) -> RoadObject:
+def read_object(road: Road, element: etree._Element, collector: AttributeReader) -> RoadObject:
     """Return an object of a road."""
 
     def number(name: str) -> float:
@@ -146,7 +148,7 @@ def read_object(road: str, element: etree._Element, collector: AttributeReader) 
         name=element.get("name", ""),
         type=element.get("type", "none"),
         subtype=element.get("subtype", ""),
-        road=road,
+        road=road.id,
         s=collector.number(element, "s"),
         t=collector.number(element, "t"),
         z_offset=number("zOffset"),
@@ -159,7 +161,7 @@ def read_object(road: str, element: etree._Element, collector: AttributeReader) 
         radius=number("radius"),
         outlines=tuple(areas),
         lines=tuple(lines),
-        repeats=tuple(_read_repeat(repeat, element, collector) for repeat in element.iterfind("repeat")),
+        repeats=tuple(_read_repeat(road, repeat, element, collector) for repeat in element.iterfind("repeat")),
     )
 
 
@@ -179,12 +181,14 @@ def _read_corners(outline: etree._Element, collector: AttributeReader) -> list[C
     return corners
 
 
-def _read_repeat(repeat: etree._Element, element: etree._Element, collector: AttributeReader) -> Repeat:
+def _read_repeat(road: Road, repeat: etree._Element, element: etree._Element, collector: AttributeReader) -> Repeat:
     def pair(name: str) -> tuple[float, float]:
         fallback = collector.number(element, name, 0.0)
         start = collector.number(repeat, f"{name}Start", fallback)
-        return start, collector.number(repeat, f"{name}End", start)
+        end = collector.number(repeat, f"{name}End", start)
+        return start, start + (end - start) * share if share < 1.0 else end
 
+    share = 1.0  # of the length that is on the road
     length, distance = collector.number(repeat, "length"), collector.number(repeat, "distance", 0.0)
     step = distance if distance > 0.0 else 1.0
     if length > MAX_REPETITIONS * step:
@@ -192,11 +196,20 @@ def _read_repeat(repeat: etree._Element, element: etree._Element, collector: Att
         collector.report_error(repeat, message, f"at most {MAX_REPETITIONS} repetitions are read")
         length = 0.0
     collector.spend(repeat, "positions of objects", max(length, 0.0) / step, MAX_OBJECTS)
+    s = collector.number(repeat, "s", collector.number(element, "s", 0.0))
+    last = s + (distance * math.floor(length / distance + EPSILON) if distance > 0.0 else length)
+    if last > road.length + BEYOND:
+        if distance > 0.0:
+            message = f"an object is repeated to s = {last:g} m of road {road.id!r}; the repetition ends with the road"
+            kind, hint = "repetitions beyond the ends of their roads", f"the road ends at {road.length:g} m"
+            collector.report_warning(repeat, MapRule.OBJECT_OFF_ROAD, kind, message, hint)
+        share = min(max(road.length - s, 0.0) / length, 1.0) if length > 0.0 else 0.0
+        length *= share
     for name in ("width", "height", "length", "radius", "t", "zOffset"):
         if max(map(abs, pair(name))) > MAX_OBJECT_SIZE:
             collector.report_error(repeat, f"<repeat> has a {name} beyond {MAX_OBJECT_SIZE:g} m", "correct it")
     return Repeat(
-        s=collector.number(repeat, "s", collector.number(element, "s", 0.0)),
+        s=s,
         length=length,
         distance=distance,
         t=pair("t"),

@@ -74,7 +74,7 @@ REPLACED = {
     "StartTrigger": "StartTrigger",
 }
 """Part of the first event that the element of an example replaces."""
-ROAD_ELEMENTS = {"header", "link", "planView", "lateralProfile", "lanes", "signals", "junction"}
+ROAD_ELEMENTS = {"header", "link", "planView", "lateralProfile", "lanes", "objects", "signals", "junction"}
 """Elements of the road file."""
 
 

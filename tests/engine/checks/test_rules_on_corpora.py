@@ -36,7 +36,10 @@ EXAMINED = {
     "esmini/xosc/cut-in_cr.xosc": {
         "impossible-state": "it waits for the end of a continuous LaneOffsetAction, which by the standard has none"
     },
-    "esmini/xosc/parking_demo.xosc": {"lane-link": "a driving lane 12 m wide, for parking, ends at a junction"},
+    "esmini/xosc/parking_demo.xosc": {
+        "lane-link": "a driving lane 12 m wide, for parking, ends at a junction",
+        "object-off-road": "trees at s = 210 m of a road of 200 m, parking spaces at 31.3 m of one of 30.1 m",
+    },
     "esmini/xosc/ltap-od-relative-speed.xosc": {"s-out-of-range": "s = 455 on a road of 304 m"},
     "scenario_runner/CatalogExample.xosc": {"simultaneous-edges": EDGES_APART, "unobserved-edge": AFTER_TIME_0},
     "scenario_runner/CyclistCrossing.xosc": {"simultaneous-edges": EDGES_APART},

@@ -206,6 +206,18 @@ def test_signal_beyond_its_road_is_moved_to_its_end() -> None:
     )
 
 
+@pytest.mark.parametrize(("distance", "expected"), [(5.0, [(95.0, -4.0), (100.0, -5.0)]), (0.0, [(97.5, -4.5)])])
+def test_repetition_beyond_its_road_ends_with_the_road(distance: float, expected: list[tuple[float, float]]) -> None:
+    """t changes by 1 m over each 5 m of the stated length, also on the part that remains."""
+    repeat = f'<repeat s="95" length="20" distance="{distance}" tStart="-4" tEnd="-8"/>'
+    text = f'<objects><object id="1" type="barrier" s="95" t="-4" length="1" width="1">{repeat}</object></objects>'
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=section(), extra=text)), "town.xodr")
+    assert [placed.pose[:2] for placed in placed_objects(network)] == [pytest.approx(place) for place in expected]
+    message = "town.xodr:1: an object is repeated to s = 115 m of road '1'; the repetition ends with the road; "
+    warned = [(f"{message}the road ends at 100 m", "object-off-road")] if distance else []
+    assert [(str(doubt), doubt.rule) for doubt in network.map_warnings] == warned
+
+
 @pytest.mark.parametrize("s", [10, 100_000])
 def test_first_lane_section_starts_at_zero(s: int) -> None:
     network = RoadNetwork.parse(map_xml(road_xml(lanes=section(s=s))))
