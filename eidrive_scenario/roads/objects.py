@@ -74,15 +74,19 @@ def lines(network: RoadNetwork, placed: PlacedObject) -> list[Array]:
 def _corners(network: RoadNetwork, placed: PlacedObject, outline: tuple[Corner, ...]) -> Array:
     pose, road, (ds, dt) = placed.pose, placed.object.road, placed.shift or (0.0, 0.0)
     cos, sin = math.cos(pose.h), math.sin(pose.h)
+    pitch, roll = placed.object.pitch, placed.object.roll
+    cp, sp, cr, sr = math.cos(pitch), math.sin(pitch), math.cos(roll), math.sin(roll)
     points = []
     for corner in outline:
         if corner.on_road:
             s = min(max(corner.x + ds, 0.0), network.roads[road].length)
             corner_pose = network.road_pose_at(road, s, corner.y + dt)
             x, y, z, *_ = corner_pose
-        else:
-            x, y, z = pose.x + cos * corner.x - sin * corner.y, pose.y + sin * corner.x + cos * corner.y, pose.z
-        points.append((x, y, z + corner.z))
+            points.append((x, y, z + corner.z))
+            continue
+        left, up = cr * corner.y - sr * corner.z, sr * corner.y + cr * corner.z
+        ahead, up = cp * corner.x + sp * up, cp * up - sp * corner.x
+        points.append((pose.x + cos * ahead - sin * left, pose.y + sin * ahead + cos * left, pose.z + up))
     return np.array(points)
 
 

@@ -15,9 +15,9 @@ from eidrive_scenario.world.actor import ActorSpec, Control, Placement
 from eidrive_scenario.world.road_objects import RoadObjectBody, road_object_bodies, signal_heads
 
 
-def network(*objects: str, signals: str = "") -> RoadNetwork:
+def network(*objects: str, signals: str = "", heading: float = 0.0) -> RoadNetwork:
     """Return a street along x whose only lane has its center at y = -2, with objects by their attributes."""
-    listed = "".join(f'<object id="{number}" hdg="0" {one}</object>' for number, one in enumerate(objects))
+    listed = "".join(f'<object id="{number}" hdg="{heading}" {one}</object>' for number, one in enumerate(objects))
     extra = f"<objects>{listed}</objects><signals>{signals}</signals>"
     return RoadNetwork.parse(map_xml(road_xml(length=200.0, lanes=lanes_xml(0, 1, 4), extra=extra)))
 
@@ -118,6 +118,28 @@ def test_orientation_of_an_object_does_not_turn_it(orientation: str) -> None:
         f'type="obstacle" s="50" t="-8" zOffset="0" orientation="{orientation}"><outline>{corners}</outline>',
     )
     assert (body.pose.x, body.pose.y, body.pose.h) == (52.0, -7.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("heading", "pitch", "roll", "expected"),
+    [
+        (0.0, 0.5, 0.0, (4 * math.cos(0.5) + math.sin(0.5), 2.0, math.cos(0.5) - 4 * math.sin(0.5))),
+        (0.0, 0.0, 0.5, (4.0, 2 * math.cos(0.5) - math.sin(0.5), math.cos(0.5) + 2 * math.sin(0.5))),
+        (math.pi / 2, math.pi / 2, math.pi / 2, (1.0, 2.0, -4.0)),
+    ],
+)
+def test_pitch_and_roll_tilt_local_outlines(
+    heading: float, pitch: float, roll: float, expected: tuple[float, float, float]
+) -> None:
+    """The corner (4, 2, 1) is rotated about the x axis, then the y axis, then the z axis.
+
+    By quarter turns it becomes (4, -1, 2), (2, -1, -4) and (1, 2, -4). Positive pitch lowers the front.
+    """
+    corners = "".join(f'<cornerLocal u="{u}" v="{v}" z="{z}"/>' for u, v, z in ((4, 2, 1), (0, 0, 0), (0, 1, 0)))
+    attributes = f'type="crosswalk" s="50" t="-8" pitch="{pitch}" roll="{roll}"'
+    roads = network(f"{attributes}><outline>{corners}</outline>", heading=heading)
+    (outline,) = crosswalks(roads)
+    assert outline[0] - (50.0, -8.0, 0.0) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("corners", [LOCAL, ON_ROAD])
