@@ -9,9 +9,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
 
+from msgspec import structs
+
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.files.bounded import load_json
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.in_flight import MessagesInFlight
 from eidrive_scenario.recording.recording import Recording, open_recording
 from eidrive_scenario.recording.run_files import ROAD_FILE, recording_in
 from eidrive_scenario.roads import RoadNetwork
@@ -26,6 +29,8 @@ from eidrive_scenario.simulation.recorded_outcome import (
     recorded_roles,
     recorded_trailers,
 )
+from eidrive_scenario.v2x.messages.message import LinkEvent
+from eidrive_scenario.v2x.statistics.link_statistics import ABSENT
 from eidrive_scenario.world.weather import Weather
 
 Part = TypeVar("Part")
@@ -90,6 +95,21 @@ class RecordedRun:
         if not count:
             hint = "; ".join(self.warnings) or "record the run again"
             raise SettingError(Diagnostic("the recording contains no readable frame", hint, str(self.recording.path)))
+
+    @cached_property
+    def _lost_in_flight(self) -> frozenset[LinkEvent]:
+        in_flight = MessagesInFlight()
+        return frozenset(event for frame in self.frames() for event in in_flight.observe(frame))
+
+    def with_losses(self, frame: Frame) -> Frame:
+        """Return the frame with losses in place of the messages that are in flight to a station when it leaves."""
+        events = (
+            event
+            if event not in self._lost_in_flight
+            else structs.replace(event, outcome="lost", arrives=None, reason=ABSENT)
+            for event in frame.links
+        )
+        return structs.replace(frame, links=tuple(events))
 
     def outcome(self) -> RecordedOutcome | None:
         """Return the outcome of the run, None if it did not end. One that cannot be read is damage, or InputError."""

@@ -71,10 +71,10 @@ def _plans(frame: Frame) -> Iterator[Row]:
 
 
 def _messages(run: RecordedRun) -> Iterator[Row]:
-    # Frames are read twice: whether a message is too old is known after its outcome
+    # Frames are read twice: whether a message is too old, or its receiver leaves, is known after its outcome
     expired = {message for frame in run.frames() for message in _expired(frame)}
     for frame in run.frames():
-        yield from run.converted(frame, lambda frame: _outcomes(frame.links, expired))
+        yield from run.converted(frame, lambda frame: _outcomes(run.with_losses(frame).links, expired))
     outcome = run.outcome()
     yield from () if outcome is None else _outcomes(outcome.final_links, expired)
 

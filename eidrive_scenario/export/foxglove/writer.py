@@ -103,7 +103,7 @@ class FoxgloveTopics(ToolTopics):
 
     def _of_frame(self, frame: Frame) -> Iterator[Entry]:
         """Yield the messages of the next frame."""
-        time = frame.view.time
+        frame, time = self._run.with_losses(frame), frame.view.time
         if not self._begun:
             self._begun = True
             if self._run.roads is not None:

@@ -15,6 +15,7 @@ from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.errors import counted
 from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.recording.in_flight import MessagesInFlight
 from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.reporting.drawing.canvas import ellipse_of_95_percent
 from eidrive_scenario.reporting.replay.light import LightChanges
@@ -24,6 +25,7 @@ from eidrive_scenario.reporting.run_report.settings_text import shorten
 from eidrive_scenario.reporting.snapshot import DEFAULT_SETTINGS, SnapshotBuilder, StationSnapshot
 from eidrive_scenario.storyboard.state.element_states import ElementState, StateChange
 from eidrive_scenario.v2x.messages.message import LinkEvent, Message
+from eidrive_scenario.v2x.statistics.link_statistics import ABSENT
 from eidrive_scenario.world.view import WorldView
 
 MOST = 40_000
@@ -44,6 +46,9 @@ class MessageList:
     def __init__(self) -> None:
         self._rows: list[Row] = []
         self._contents: dict[tuple[str, int], str] = {}
+        self._indices: dict[LinkEvent, int] = {}
+        self._taken = 0
+        self._lost: list[int] = []
         self._texts: dict[str, str] = {}
         """Contents, each once, as most messages of a run have equal ones."""
         self.count = 0
@@ -65,16 +70,28 @@ class MessageList:
                 continue
             delivered = event.outcome == "delivered" and event.arrives is not None and math.isfinite(event.arrives)
             arrives = round(event.arrives, 3) if delivered and event.arrives is not None else None
+            self._indices[event] = self.count
             self._rows.append([
                 round(event.sent, 3), event.sender, event.receiver, arrives, "" if delivered else _reason(event),
                 event.size, self._contents.get((event.sender, event.number), ""),
             ])  # fmt: skip
             self.count += 1
 
+    def lose(self, events: Iterable[LinkEvent]) -> None:
+        """Change messages that were in flight to a station when it left to losses."""
+        for index in (self._indices[event] for event in events if event in self._indices):
+            self._rows[index][3:5] = None, ABSENT
+            self._lost.append(index)
+
     def take(self) -> list[Row]:
         """Return the messages since the last call."""
-        rows, self._rows = self._rows, []
-        return rows
+        taken, self._taken = self._taken, self.count
+        return self._rows[taken:]
+
+    def take_lost(self) -> list[int]:
+        """Return the indices of messages that became losses since the last call."""
+        lost, self._lost = self._lost, []
+        return lost
 
 
 def describe_content(message: Message) -> str:
@@ -167,6 +184,7 @@ class ReplayBuilder:
         self._report, self._settings, self._models, self._light = report, settings, models, light
         self._builders: dict[str, SnapshotBuilder] = {}
         self._series, self._messages, self._timeline = SeriesBuilder(), MessageList(), Timeline()
+        self._in_flight = MessagesInFlight()
         self._left = _LARGEST_PAGE
         """Number of bytes that the page may still contain."""
         self._width = 0
@@ -201,6 +219,7 @@ class ReplayBuilder:
         for step in frame.steps.values():
             self._messages.observe_sent(step.outbox)
         self.observe_links(frame.links)
+        self._messages.lose(self._in_flight.observe(frame))
         self._timeline.observe(frame.changes)
 
     def observe_links(self, events: Iterable[LinkEvent]) -> None:
@@ -222,6 +241,7 @@ class ReplayBuilder:
         return {
             **part,
             "messages": self._messages.take(),
+            "lost": self._messages.take_lost(),
             "timeline": self._timeline.take(),
             "models": self._models.take(),
             "series": self._series.take(),
@@ -268,7 +288,8 @@ def replay_data(
                it demands braking, and the rows of the fused objects that are the reason. None: absent.
                A box is [x, y, l, w, yaw, h], with the probability of existence as seventh entry if it is estimated,
                None otherwise if more entries follow
-    messages   see `MessageList`; timeline  see `Timeline`; series, contact, decisive  see `SeriesBuilder`
+    messages   see `MessageList`; lost  indices of those whose receiver left while they were in flight
+    timeline   see `Timeline`; series, contact, decisive  see `SeriesBuilder`
     changes    [time, path, name, after, why] of the storyboard transitions
     contacts   [time, name, other name, relative speed at the impact [m/s]] of all contacts
 
@@ -312,7 +333,8 @@ def overlay(data: Data) -> Data:
         for name, steps in data["stations"].items()
     }
     lost = [row for row in data["messages"] if row[3] is None]
-    return {**data, "stations": plans, "messages": lost, "changes": [], "timeline": [], "models": {}, "light": []}
+    lists: Data = {key: [] for key in ("lost", "changes", "timeline", "light")}
+    return {**data, **lists, "stations": plans, "messages": lost, "models": {}}
 
 
 _LISTS = ("times", "ticks", "poses", "changes", "contacts", "light")

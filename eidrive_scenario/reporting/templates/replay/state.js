@@ -54,6 +54,7 @@ function addPart(part, run = data) {
   const text = (index) => part.texts[index];
   for (const [sent, sender, receiver, arrives, reason, size, content] of part.messages)
     run.messages.push([sent, text(sender), text(receiver), arrives, text(reason), size, text(content)]);
+  for (const index of part.lost) run.messages[index].splice(3, 2, null, "absent");
   for (const [name, actor] of Object.entries(part.actors)) run.actors[name] = run.actors[name] || actor;
   const count = run.times.length;
   for (const [name, column] of Object.entries(part.poses)) addColumn(run.poses, name, unpack(column), before);
