@@ -83,6 +83,7 @@ def _print_table(summaries: Sequence[PointSummary], interval: str, confidence: f
     from rich.table import Table
 
     from eidrive_scenario.cli.console import console
+    from eidrive_scenario.experiments.statistics.intervals import exact_percentage, percentage
 
     axes = list(dict.fromkeys(name for summary in summaries for name in summary.point))
     counted = dict.fromkeys(status for summary in summaries for status in summary.counts)
@@ -90,7 +91,7 @@ def _print_table(summaries: Sequence[PointSummary], interval: str, confidence: f
     table = Table(box=None, pad_edge=False, header_style="bold")
     for name in axes:
         table.add_column(name, overflow="fold")
-    for name in ("runs", "passed", *statuses, "success rate", f"{confidence:.0%} {interval}"):
+    for name in ("runs", "passed", *statuses, "success rate", f"{exact_percentage(confidence)} {interval}"):
         table.add_column(name, justify="right")
     for summary in summaries:
         rate = summary.rate
@@ -99,8 +100,8 @@ def _print_table(summaries: Sequence[PointSummary], interval: str, confidence: f
             str(sum(summary.counts.values())),
             str(summary.counts.get("passed", 0)),
             *(str(summary.counts.get(status, 0)) for status in statuses),
-            "" if rate is None else f"{rate.share:.1%}",
-            "" if rate is None else f"{rate.low:.1%} to {rate.high:.1%}",
+            "" if rate is None else percentage(rate.share),
+            "" if rate is None else f"{percentage(rate.low)} to {percentage(rate.high)}",
         )
     out = console()
     if not out.is_terminal:  # lines as long as necessary, so that other programs can read them

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from eidrive_scenario.errors import ABORTED, NOT_JUDGED, SimulationError, counted
 from eidrive_scenario.experiments.commands import reproduction_lines
-from eidrive_scenario.experiments.statistics.intervals import Proportion, anytime_interval
+from eidrive_scenario.experiments.statistics.intervals import Proportion, anytime_interval, exact_percentage, percentage
 from eidrive_scenario.experiments.statistics.sequential import Decision, RatioTest
 from eidrive_scenario.simulation import RunResult
 
@@ -38,11 +38,10 @@ class RateVerdict:
 
 def decision_text(test: RatioTest, decision: Decision, rate: Proportion) -> str:
     """Return the decision of a test of a required rate in one line."""
-    runs = (
-        f"{rate.successes} of {counted(rate.trials, 'run')} passed: {rate.share:.1%}, {rate.low:.1%} to {rate.high:.1%}"
-    )
-    confidence = 1.0 - test.false_pass
-    return f"success rate of at least {test.bad:.1%} with a confidence of {confidence:.0%}: {decision} ({runs})"
+    share, low, high = map(percentage, (rate.share, rate.low, rate.high))
+    runs = f"{rate.successes} of {counted(rate.trials, 'run')} passed: {share}, {low} to {high}"
+    required, confidence = exact_percentage(test.bad, 1), exact_percentage(1.0 - test.false_pass)
+    return f"success rate of at least {required} with a confidence of {confidence}: {decision} ({runs})"
 
 
 def decide_rate(run: Callable[[int], RunResult], test: RatioTest) -> RateVerdict:

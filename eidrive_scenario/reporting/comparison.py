@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from eidrive_scenario.errors import counted
-from eidrive_scenario.experiments.statistics.intervals import interval_text
+from eidrive_scenario.experiments.statistics.intervals import exact_percentage, interval_text, percentage
 from eidrive_scenario.experiments.sweeps.axes import text_of_value
 from eidrive_scenario.experiments.sweeps.comparison import UNDECIDED, Comparison, NamedComparison
 from eidrive_scenario.reporting.page import write_page
@@ -19,7 +19,7 @@ from eidrive_scenario.reporting.page import write_page
 _EXPLANATION = (
     "Pairs are runs with equal scenario, seed and other values. Differences are those to the reference, with score "
     "intervals (Tango 1998). p is that of McNemar's exact test of equal success rates. Not worse: a decrease by "
-    "{margin:.1%} or more is excluded with a confidence of {confidence:.0%}."
+    "{margin} or more is excluded with a confidence of {confidence}."
 )
 
 
@@ -39,33 +39,41 @@ def text_lines(comparisons: Sequence[NamedComparison]) -> Iterator[str]:
 def _lines(comparison: Comparison) -> Iterator[str]:
     counts = comparison.verdicts
     first, second = comparison.rates
-    low, high = comparison.interval
+    confidence, margin = exact_percentage(comparison.confidence), exact_percentage(comparison.margin, 1)
     yield (
         f"{counted(counts.pairs, 'pair')} of runs with a verdict, {comparison.identical} with equal trace hashes; "
         f"{counted(comparison.unpaired, 'run')} without a partner"
     )
     yield (
-        f"A passed {first:.1%}, B passed {second:.1%}; "
+        f"A passed {percentage(first)}, B passed {percentage(second)}; "
         f"only A passed in {counted(counts.only_first, 'pair')}, only B in {counts.only_second}"
     )
     yield (
-        f"B - A: {counts.difference:+.1%} ({comparison.confidence:.0%}: {low:+.1%} to {high:+.1%}); "
+        f"B - A: {_signed(counts.difference)} ({confidence}: {_limits(comparison)}); "
         f"McNemar's exact test: p = {comparison.p_value:.3g}"
     )
     for name, paired in comparison.metrics.items():
         interval, pairs = interval_text(paired.low, paired.high, "+.4g"), counted(paired.pairs, "pair")
-        yield f"{name}: B - A {paired.mean:+.4g} ({comparison.confidence:.0%}: {interval}; {pairs})"
+        yield f"{name}: B - A {paired.mean:+.4g} ({confidence}: {interval}; {pairs})"
     if comparison.is_not_worse:
-        yield f"B is not worse than A by {comparison.margin:.1%} or more (p = {comparison.p_worse:.3g})"
+        yield f"B is not worse than A by {margin} or more (p = {comparison.p_worse:.3g})"
     elif comparison.is_worse:
         yield "B is worse than A"
     elif comparison.lost:
         yield f"undecided: B has no verdict of {counted(comparison.lost, 'run')} with a verdict in A; repeat by --retry"
     else:
         yield (
-            f"undecided: the runs do not show that B is not worse by {comparison.margin:.1%} or more "
+            f"undecided: the runs do not show that B is not worse by {margin} or more "
             f"(p = {comparison.p_worse:.3g}); more pairs, or a larger --margin"
         )
+
+
+def _signed(difference: float) -> str:
+    return percentage(difference, sign="+")
+
+
+def _limits(comparison: Comparison) -> str:
+    return " to ".join(map(_signed, comparison.interval))
 
 
 def _no_pair(named: NamedComparison, second: str, first: str) -> str:
@@ -130,7 +138,7 @@ class _Row:
 def _table(comparisons: Sequence[NamedComparison]) -> tuple[list[str], list[_Row]]:
     """Return the titles of the columns after the conclusion, and the rows."""
     metrics = dict.fromkeys(name for named in comparisons if named.comparison for name in named.comparison.metrics)
-    confidence = f"{_compared(comparisons).confidence:.0%}"
+    confidence = exact_percentage(_compared(comparisons).confidence)
     columns = ["pairs", "reference passed", "passed", "only reference passed", "only this passed"]
     columns += [f"difference ({confidence})", "p", *(f"{name}, difference ({confidence})" for name in metrics)]
     rows = []
@@ -144,11 +152,11 @@ def _table(comparisons: Sequence[NamedComparison]) -> tuple[list[str], list[_Row
         remark = f"{name}: no verdict of {counted(comparison.lost, 'run')} with a verdict of the reference"
         cells = [
             str(counts.pairs),
-            f"{first:.1%}",
-            f"{second:.1%}",
+            percentage(first),
+            percentage(second),
             str(counts.only_first),
             str(counts.only_second),
-            f"{counts.difference:+.1%} ({low:+.1%} to {high:+.1%})",
+            f"{_signed(counts.difference)} ({_limits(comparison)})",
             f"{comparison.p_value:.3g}",
             *(
                 f"{paired.mean:+.4g} ({interval_text(paired.low, paired.high, '+.4g')})" if paired is not None else ""
@@ -183,7 +191,8 @@ def as_markdown(comparisons: Sequence[NamedComparison]) -> str:
 
 def _explanation(comparisons: Sequence[NamedComparison]) -> str:
     comparison = _compared(comparisons)
-    return _EXPLANATION.format(margin=comparison.margin, confidence=comparison.confidence)
+    margin, confidence = exact_percentage(comparison.margin, 1), exact_percentage(comparison.confidence)
+    return _EXPLANATION.format(margin=margin, confidence=confidence)
 
 
 def _code(text: str) -> str:

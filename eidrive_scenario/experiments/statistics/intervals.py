@@ -161,6 +161,19 @@ def jackknife_interval(value: float, left_out: Sequence[float], *, confidence: f
     return MeanInterval(value, value + interval.low - interval.mean, value + interval.high - interval.mean)
 
 
+def percentage(share: float, decimals: int = 1, sign: str = "") -> str:
+    """Return a share as text in percent, with further decimals if it would be 0 or 100 % without being so."""
+    digits = next((digits for digits in range(decimals, 10) if round(100.0 * share, digits) % 100.0), decimals)
+    return f"{share:{sign}.{digits}%}"
+
+
+def exact_percentage(setting: float, decimals: int = 0) -> str:
+    """Return a setting, such as a confidence, as text in percent with all its decimals."""
+    value = 100.0 * setting
+    digits = next((digits for digits in range(decimals, 10) if math.isclose(round(value, digits), value)), 10)
+    return f"{setting:.{digits}%}"
+
+
 def interval_text(low: float, high: float, form: str) -> str:
     """Return the limits of an interval as text, with a format specification such as `+.2f`."""
     return "no interval, too few values" if math.isnan(low) else f"{low:{form}} to {high:{form}}"

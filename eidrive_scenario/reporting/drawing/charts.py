@@ -23,7 +23,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedFormatter, FixedLocator, MaxNLocator, PercentFormatter
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.experiments.statistics.intervals import Proportion
+from eidrive_scenario.experiments.statistics.intervals import Proportion, percentage
 from eidrive_scenario.reporting.drawing.vector_canvas import LABEL, NO_METADATA, PAPER_STYLE, Size, paper_style
 
 PAGE_COLORS = {"#475569": "--axis", "#e5e7eb": "--line", "#334155": "--text", "#ffffff": "--paper"}
@@ -315,7 +315,7 @@ def _draw_rates(axes: Axes, columns: MapAxis, rows: MapAxis, rates: Rates) -> Qu
         for row, column in np.argwhere(np.isfinite(shares)).tolist():
             x, y, share = columns.centers[column], rows.centers[row], shares[row, column]
             color = dark if share > _BRIGHT else "#fffffe"
-            axes.text(x, y, f"{100.0 * share:.0f}", color=color, ha="center", va="center", fontsize=8.0)
+            axes.text(x, y, percentage(share, 0).removesuffix("%"), color=color, ha="center", va="center", fontsize=8.0)
     return mesh
 
 

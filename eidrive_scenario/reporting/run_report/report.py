@@ -18,7 +18,7 @@ from typing import Any
 from eidrive_scenario.base.installation import ENGINE
 from eidrive_scenario.errors import Diagnostic, InputError, counted
 from eidrive_scenario.experiments.reported_run import OUTCOMES, ReportedRun, parse_run
-from eidrive_scenario.experiments.statistics.intervals import Summary, summarize
+from eidrive_scenario.experiments.statistics.intervals import Summary, percentage, summarize
 from eidrive_scenario.files.bounded import path_argument
 from eidrive_scenario.reporting.page import write_page
 from eidrive_scenario.reporting.run_report.rates import (
@@ -96,6 +96,7 @@ def write_run_report(
         failures=failures[:MOST_WITHOUT_SCRIPT],
         unlisted=len(failures[MOST_WITHOUT_SCRIPT:]),
         failure_reason=failure_reason,
+        percentage=percentage,
         metrics=[titles[name] for name in metrics],
         groups=[
             {

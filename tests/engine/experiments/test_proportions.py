@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.base.randomness import generator
-from eidrive_scenario.experiments.statistics.intervals import anytime_interval, clopper_pearson, wilson
+from eidrive_scenario.experiments.statistics.intervals import (
+    anytime_interval,
+    clopper_pearson,
+    exact_percentage,
+    percentage,
+    wilson,
+)
 
 KNOWN = [
     (19, 20, (0.763869, 0.991119), (0.751267, 0.998735), (0.657592, 0.999881)),
@@ -78,3 +84,36 @@ def test_intervals_with_invalid_arguments_raise(
     assert callable(function)
     with pytest.raises(ValueError, match=expected):
         function(*counts, confidence)
+
+
+@pytest.mark.parametrize(
+    ("share", "decimals", "text"),
+    [
+        (0.0, 1, "0.0%"),
+        (1.0, 0, "100%"),
+        (0.985, 1, "98.5%"),
+        (399 / 400, 0, "99.8%"),
+        (1 / 400, 0, "0.2%"),
+        (4999 / 5000, 1, "99.98%"),
+        (1 - 1e-12, 1, "100.0%"),
+    ],
+)
+def test_share_below_all_and_above_none_is_not_rounded_to_them(share: float, decimals: int, text: str) -> None:
+    """100 · 399/400 = 99.75, which rounds to the even digit. A share that differs from 1 by less than 5e-12 is 1."""
+    assert percentage(share, decimals) == text
+    assert percentage(-share, decimals, "+") == f"-{text}"
+
+
+@pytest.mark.parametrize(
+    ("setting", "decimals", "text"),
+    [
+        (0.95, 0, "95%"),
+        (0.995, 0, "99.5%"),
+        (1.0 - 0.001, 0, "99.9%"),
+        (0.975, 0, "97.5%"),
+        (0.05, 1, "5.0%"),
+        (0.0004, 1, "0.04%"),
+    ],
+)
+def test_percentage_of_setting_has_all_decimals(setting: float, decimals: int, text: str) -> None:
+    assert exact_percentage(setting, decimals) == text
