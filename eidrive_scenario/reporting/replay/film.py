@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from functools import partial
@@ -116,10 +117,18 @@ class RecordedStation:
         raise InputError(Diagnostic("this frame of the recording cannot be drawn", "give another --at"))
 
     def pictures(self, size: tuple[int, int], rate: float) -> Iterator[Image]:
-        """Yield the pictures of `rate` instants per second. Raise InputError for more than MOST_PICTURES."""
+        """Yield the pictures of `rate` instants per second, each of the last frame until then.
+
+        Raise InputError for more than MOST_PICTURES.
+        """
         shown = 0
+        picture: Image | None = None
         for snapshot, center in self._centered():
-            wanted = math.floor((snapshot.time - self.times[0]) * rate + 1e-6) + 1
+            later = bisect_right(self.times, snapshot.time)
+            if later < len(self.times):
+                wanted = math.ceil((self.times[later] - self.times[0]) * rate - 1e-6)
+            else:
+                wanted = math.floor((snapshot.time - self.times[0]) * rate + 1e-6) + 1
             if wanted > MOST_PICTURES:
                 hint = "write pictures with --png, or the page"
                 raise InputError(Diagnostic(f"the film has more than {MOST_PICTURES} pictures", hint))
@@ -127,7 +136,8 @@ class RecordedStation:
                 try:
                     picture = snapshot_picture(snapshot, self.roads, center, size=size)
                 except UNDRAWABLE:
-                    continue
+                    if picture is None:
+                        continue
                 for _ in range(wanted - shown):
                     yield picture
                 shown = wanted

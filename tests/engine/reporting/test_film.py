@@ -110,6 +110,15 @@ def test_picture_of_incomplete_recording_is_within_its_frames(street: Play, tmp_
     assert station.figure() is not None
 
 
+def test_picture_shows_the_last_frame_until_its_instant(
+    street: Play, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Frames are at multiples of 0.05 s, pictures at those of 1/12 s; 1/12 s is in the interval of the second frame."""
+    monkeypatch.setattr(film, "snapshot_picture", lambda snapshot, *_, **__: snapshot.time)
+    times = list(recorded(street(1), tmp_path).pictures(film.GIF_SIZE, 12.0))
+    assert times == pytest.approx([0.05 * (20 * number // 12) for number in range(int(4.95 * 12) + 1)])
+
+
 @pytest.mark.usefixtures("small")
 def test_film_plays_at_the_speed_of_the_run(street: Play, tmp_path: Path) -> None:
     """100 frames of 0.05 s are 100 pictures at 20 per second, and 50 of a GIF at 10 per second."""
