@@ -18,7 +18,7 @@ from eidrive_scenario.base.imports import optional_import
 from eidrive_scenario.errors import Diagnostic, SettingError, counted
 from eidrive_scenario.experiments.statistics.intervals import Proportion, anytime_interval, clopper_pearson, wilson
 from eidrive_scenario.experiments.sweeps.axes import axis_identity, without_run
-from eidrive_scenario.experiments.sweeps.result_folders import folder_runs, varying, with_axes
+from eidrive_scenario.experiments.sweeps.result_folders import SCENARIO, folder_runs, varying, with_axes
 from eidrive_scenario.experiments.sweeps.store import FAILED, PASSED, REPEATABLE, STATUSES, ResultStore, StoredRun
 from eidrive_scenario.files.atomic import write_atomically
 from eidrive_scenario.files.bounded import path_argument
@@ -143,7 +143,8 @@ def partner_identity(run: StoredRun, axis: str) -> Identity:
     """
     varied = _varied_parameters(run)
     others = {name: value for name, value in {**without_run(run.point), **varied}.items() if name != axis}
-    return run.scenario, None if axis in varied else run.run, run.seed, tuple(sorted(others.items()))
+    scenario = "" if axis == SCENARIO else run.scenario
+    return scenario, None if axis in varied else run.run, run.seed, tuple(sorted(others.items()))
 
 
 def values_of(runs: Iterable[StoredRun]) -> dict[str, list[Any]]:

@@ -52,6 +52,17 @@ def test_runs_are_in_the_order_of_their_paths(eidrive: Eidrive, scenario: Path, 
     assert compare_values([tmp_path / "runs"], "channel")[0].first == "80211p_urban"
 
 
+def test_scenarios_of_a_folder_are_compared_by_seed(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
+    """Ego drives up to 5 m/s in both scenarios, which are equal but for their file: 2 pairs, both passed."""
+    other = scenario.with_stem("other")
+    other.write_bytes(scenario.read_bytes())
+    for path in (scenario, other):
+        eidrive("run", path, "--param", "Speed=5", "--repeat", "2", "--no-record", "--out", tmp_path / "runs")
+    (between,) = compare_values([tmp_path / "runs"], "scenario")
+    assert between.comparison is not None
+    assert (between.comparison.verdicts.both, between.comparison.unpaired) == (2, 0)
+
+
 def test_folders_are_compared_as_stores(eidrive: Eidrive, runs: Path) -> None:
     (between,) = compare_values([runs], "Speed")
     assert between.comparison is not None
