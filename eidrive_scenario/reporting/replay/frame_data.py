@@ -240,6 +240,8 @@ class ReplayBuilder:
         part, self._part = self._part, _empty_part()
         return {
             **part,
+            "names": list(part["actors"]),
+            "station_names": list(part["stations"]),
             "messages": self._messages.take(),
             "lost": self._messages.take_lost(),
             "timeline": self._timeline.take(),
@@ -279,6 +281,7 @@ def replay_data(
     """Return the frames as plain lists, with lengths in cm and angles in mrad resolution.
 
     times      of the frames [s], and their ticks
+    names, station_names   of the new actors and of the stations, in their order
     actors     category, size [length, width, height], and the values of `ActorModels.describe` by name
     models     see `ActorModels.take`; light  see `light_entry`
     poses      [x, y, yaw of the box center, speed] by frame and name; also [height of the center of the bottom,

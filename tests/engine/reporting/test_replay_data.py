@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from msgspec.structs import replace
+from written_recording import detected, step, view
 
 from eidrive_scenario.base.coverage import ViewSector
 from eidrive_scenario.base.detections import Detections
@@ -309,6 +310,13 @@ def test_number_of_messages_in_page_is_limited(monkeypatch: pytest.MonkeyPatch) 
         messages.observe([LinkEvent("RSU", "Ego", number, 0.1 * number, "delivered", 1.0, "", 200)])
     assert len(messages.take()) == messages.count == 3
     assert messages.omitted == 2
+
+
+def test_names_are_in_the_order_of_the_recording() -> None:
+    """JavaScript sorts keys such as "10" and "9" of an object by their numbers: the page needs lists."""
+    steps = {name: step(detected(0.0, [])) for name in ("10", "9")}
+    page = packed(replay_data([Frame(view({"A": {}, "10": {}, "9": {}}), steps)]))
+    assert (page["names"], page["station_names"]) == (["A", "10", "9"], ["10", "9"])
 
 
 def test_timeline_has_interval_per_execution_with_reasons() -> None:

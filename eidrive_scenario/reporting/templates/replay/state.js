@@ -71,8 +71,9 @@ function addPart(part, run = data) {
   run.decisive = part.decisive;
   last = data.times.length - 1;
   duration = last < 0 ? 0 : data.times[last] - data.times[0];
-  names = Object.keys(data.actors);
-  stations = Object.keys(data.stations);
+  // JavaScript sorts the keys of an object that are whole numbers
+  if (run === data) names.push(...part.names);
+  if (run === data) stations.push(...part.station_names.filter((name) => !stations.includes(name)));
   if (other) instants = [...data.times, ...other.times.filter((time) => time > data.times[last] + 1e-6)];
 }
 
