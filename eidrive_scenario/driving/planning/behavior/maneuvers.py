@@ -73,6 +73,8 @@ class Situation(msgspec.Struct, frozen=True):
     """Next lane change that the route requires."""
     passages: tuple[Passage, ...] = ()
     """Current and next passages of junctions."""
+    released: float = -math.inf
+    """Time at which the last stop that a signal required ended [s]."""
 
     @property
     def junction(self) -> float:
@@ -339,6 +341,10 @@ def passing_profiles(
             one_lane = math.isnan(beside.left) and math.isnan(beside.right)
             solid = any(lanes.has_solid_line for lanes in (beside, *obstacle.beside))
             may_cross = not solid and returns and obstacle.end < situation.junction - BEFORE_JUNCTION
+            # The vehicle brakes for the end of the route ahead of what it has overtaken, which it expects to drive on.
+            braking = situation.wanted**2 / (2.0 * situation.settings.comfortable_deceleration)
+            ahead = max(obstacle.fastest * situation.settings.horizon, braking)
+            may_cross = may_cross and obstacle.end + ahead < situation.end
             sides = (overtaking,) if one_lane else ()
         around = [_around(situation, scene, obstacle, side) for side in sides]
         profiles += [profile for profile in around if profile and (may_cross or not profile.uses_oncoming)]
@@ -567,9 +573,11 @@ def may_pass(situation: Situation, scene: Surroundings) -> bool:
 
 
 def sets_off(situation: Situation, scene: Surroundings) -> bool:
-    """Return whether what holds the vehicle up, and what stands close ahead of that, sets off before it is beside."""
+    """Return whether what holds the vehicle up, and what stands close ahead of that, sets off while the vehicle can
+    still stop behind it comfortably."""
     blocker = _blocker(situation, scene)
-    return blocker is not None and blocker.rear > situation.front and _obstacle(situation, scene, blocker) is None
+    stop = situation.front + situation.speed**2 / (2.0 * situation.settings.comfortable_deceleration)
+    return blocker is not None and blocker.rear > stop and _obstacle(situation, scene, blocker) is None
 
 
 def _is_parked(situation: Situation, hypothesis: Present) -> bool:
@@ -594,10 +602,13 @@ def _queues(situation: Situation, scene: Surroundings, blocker: Present) -> bool
         return True
     known_object = situation.objects[blocker.owner]
     since, may_queue = known_object.still_since, known_object.kind != "misc" and known_object.kind not in ON_FOOT
-    if not may_queue or since is None or situation.now - since >= QUEUE_PATIENCE:
+    if not may_queue or since is None or situation.now - max(since, situation.released) >= QUEUE_PATIENCE:
         return False
     if _is_beside(situation, blocker):
         return False
+    along, end = situation.line.along, situation.window[1]
+    if end < len(along) and blocker.front + QUEUE_GAP > along[end - 1]:
+        return True  # What it may wait behind is not in the window yet.
     return any(
         -0.5 < hypothesis.rear - blocker.front < QUEUE_GAP and abs(hypothesis.d - blocker.d) < 1.0
         for hypothesis in scene.present

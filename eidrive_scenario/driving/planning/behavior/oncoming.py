@@ -63,6 +63,9 @@ is not given up for the noise of a motion."""
 NARROW = 1.0
 """Distance between an object and the center of the oncoming lane below which traffic has to slow down for it [m]: half
 the width of a car."""
+IN_MIDDLE = 0.8
+"""Distance from the center of the oncoming lane within which a standing vehicle blocks it [m]: no other passes it there
+before the vehicle has left the lane."""
 VIEWPOINT, TARGET = 1.5, 1.0
 """Heights of sensor and traffic above the road for the view over a crest [m]."""
 BRAKING = 3.0
@@ -289,8 +292,10 @@ class OncomingTraffic:
         viewpoints = motion.s + body.center
         beside_line = profile.offset(viewpoints)
         here = (float(viewpoints[0]), float(beside_line[0]))
-        # Traffic out of view behind that in view does not come before it.
-        nearest: Array = scene.front[traffic].min(axis=0, initial=math.inf)
+        # Traffic out of view behind that in view does not come before it, nor before what has stopped beyond the end.
+        centered = np.abs(scene.d[:, 0] - outlook.beside.oncoming) < IN_MIDDLE
+        has_stopped = centered & (np.abs(scene.speed[:, 0]) <= ONCOMING_SPEED) & (scene.rear[:, 0] > end)
+        nearest: Array = scene.front[traffic | has_stopped].min(axis=0, initial=math.inf)
         free = self._free(outlook, here, until, end, float(nearest[0]))
         if free >= nearest[0] or self._suffices(free, here[0], until, end, outlook):
             return Verdict.GO

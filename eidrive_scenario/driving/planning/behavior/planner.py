@@ -77,6 +77,8 @@ class BehaviorPlanner(RoutePlanner):
         self._line: ReferenceLine | None = None
         self._index = 0
         """Point of the line at the vehicle in the last plan."""
+        self._released = -math.inf
+        """Time of the last plan with a stop that a signal requires [s]."""
         self._route_lanes: list[RouteLane] = []
         """Lanes of a path that changes lanes, from the current one on."""
         self._conflict_ways: ConflictWays | None = None
@@ -253,6 +255,8 @@ class BehaviorPlanner(RoutePlanner):
         ]
         near = [known_objects[index] for index in indexes]
         stop = self._stop(line.path, ego, x, y, now)
+        if stop is not None:
+            self._released = now
         passages = tuple(passage for passage in self._passages if passage.end > s)
         gives_way, defers = self._precedence(passages)
         limits, hidden = self._caution(ego, objects, line, s, wanted, now)
@@ -278,6 +282,7 @@ class BehaviorPlanner(RoutePlanner):
             hidden=hidden,
             change=self._change(line, s),
             passages=passages,
+            released=self._released,
         )
         return self._decider.decide(situation)
 

@@ -192,6 +192,19 @@ def test_traffic_out_of_view_does_not_come_before_that_in_view(start: float, spe
     assert verdict((40.0, 0.0, 0.0), (start, 3.5, speed), view=130.0) is expected
 
 
+@pytest.mark.parametrize(
+    ("place", "offset", "expected"),
+    [
+        (95.0, 3.5, Verdict.GO),
+        (95.0, 4.5, Verdict.WAIT),  # others pass a car at the edge of the lane
+        (70.0, 3.5, Verdict.WAIT),  # it is in the way of the return
+        (125.0, 3.5, Verdict.WAIT),  # up to 116 m, the end of the view, traffic may be before it
+    ],
+)
+def test_no_traffic_comes_before_a_car_that_has_stopped(place: float, offset: float, expected: Verdict) -> None:
+    assert verdict((40.0, 0.0, 0.0), (place, offset, 0.0), view=130.0) is expected
+
+
 @pytest.mark.parametrize(("quiet", "expected"), [(120.0, Verdict.WAIT), (160.0, Verdict.GO)])
 def test_traffic_is_over_if_the_next_vehicle_is_improbable(quiet: float, expected: Verdict) -> None:
     """From -13.6 m on, for 11 - 1.5 s, traffic at 8 m/s comes from 130 m farther to 68.8 m in 6 s: it can be unseen for

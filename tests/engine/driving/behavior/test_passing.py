@@ -13,6 +13,7 @@ from signal_street import CAR
 
 from eidrive_scenario.base.coverage import ViewSector
 from eidrive_scenario.driving.planning.behavior.proposals import Start, change_length, passing
+from eidrive_scenario.driving.planning.signal_stops import StopPoint
 from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.roads import RoadNetwork
 
@@ -74,6 +75,31 @@ def test_pass_of_a_queue_that_sets_off_is_given_up(start: float) -> None:
     assert any("pass car" in plan.reason for plan in run.plans[130:])
     assert max(y for _, y, _ in run.path) + CAR.size[1] / 2.0 < 0.1, "in its lane, within the error of the control"
     assert run.front < queue(20.0)[0].x - 2.25
+
+
+def test_queue_at_a_light_may_be_passed_a_time_after_green(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The car has stood for 30 s, of which the light is red for 24 s; its queue counts for 20 s of green."""
+    roads = two_lane_road()
+    planner = behavior(roads)
+    stop = StopPoint(58.0, "red light")
+    monkeypatch.setattr(planner, "_stop", lambda *arguments: stop if arguments[-1] < 24.0 else None)
+    run = PlannedDrive(planner, roads)
+    run.run(60.0, lambda now: [KnownBox(60.0), KnownBox(68.0)])
+    run.world.close()
+    begins = next(number for number, reason in enumerate(run.reasons) if "pass" in reason)
+    assert begins * 0.05 == pytest.approx(44.0, abs=0.2)
+
+
+@pytest.mark.parametrize(("length", "overtakes"), [(420.0, False), (700.0, True)])
+def test_moving_vehicle_is_overtaken_with_space_before_the_end_of_the_route(length: float, overtakes: bool) -> None:
+    """A bus is 2.6 m/s slower. The vehicle comes out of its lane at 255 m, and gains 45 m, with both lengths, within
+    200 m: until 455 m."""
+    roads = two_lane_road(length)
+    run = PlannedDrive(behavior(roads, 11.6), roads, speed=9.0)
+    run.run(50.0, lambda now: [KnownBox(65.0 + 9.0 * now, vx=9.0, kind="bus", size=(12.0, 2.5))])
+    run.world.close()
+    assert (max(y for _, y, _ in run.path) > 0.0) is overtakes
+    assert run.path[-1][1] == pytest.approx(LANE, abs=0.1)
 
 
 def test_pedestrian_along_the_lane_is_overtaken() -> None:
