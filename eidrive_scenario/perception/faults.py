@@ -107,6 +107,8 @@ def with_false_objects(detections: Detections, objects: Sequence[FalseObject], *
     )
     covariance = np.array([np.eye(2) * false_object.deviation**2 for false_object in added])
     boxes = np.array([false_object.box(detections.time) for false_object in added])
+    # Their velocities are exact; fusion raises the variance to the usual one.
+    variance = detections.velocity_variance
     return replace(
         detections,
         boxes=np.concatenate([detections.boxes, boxes]),
@@ -116,4 +118,5 @@ def with_false_objects(detections: Detections, objects: Sequence[FalseObject], *
         covariance=np.concatenate([detections.covariance, covariance]),
         tracks=(*detections.tracks, *(FIRST_TRACK + number for number in numbers)) if detections.tracks else (),
         existence=np.concatenate([detections.existence, scores]) if len(detections.existence) else NOT_ESTIMATED,
+        velocity_variance=np.concatenate([variance, np.zeros(len(added))]) if len(variance) else NOT_ESTIMATED,
     )

@@ -59,6 +59,13 @@ def test_false_objects_keep_the_stated_deviation_of_velocities() -> None:
     assert with_false_objects(measured, [FalseObject(x=9.0, y=0.0)], with_velocity=True).velocity_deviation == 1.5
 
 
+@pytest.mark.parametrize(("stated", "expected"), [([2.0], [2.0, 0.0]), ([], [])])
+def test_false_objects_have_exact_velocities(stated: list[float], expected: list[float]) -> None:
+    detections = replace(ONE, velocity_variance=np.array(stated))
+    both = with_false_objects(detections, [FalseObject(x=9.0, y=0.0)], with_velocity=True)
+    assert both.velocity_variance.tolist() == expected
+
+
 @pytest.mark.parametrize(
     ("settings", "reason"),
     [
