@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.detections import CLASSES, Detections
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.errors import InvalidResult
@@ -16,7 +16,7 @@ LARGEST = 1e9
 LARGEST_SIZE = 1e5
 """Maximum length, width or height of an object [m], as in road files."""
 _ROUNDING = 1e-5
-"""Excess of a probability over 1 that single precision explains."""
+"""Excess of a probability over 1, and relative error of a covariance, that single precision explains."""
 
 _REAL = "fiu"
 """Kinds of numpy arrays of real numbers."""
@@ -37,8 +37,9 @@ def check_detections(extension: object, method: str, detections: object, *, now:
 
     now  time after which nothing can have been measured [s]; None: fused reports, whose clocks may be fast
 
-    Sizes are in [0, LARGEST_SIZE], scores and existence in [0, 1], variances at least 0, and no coordinate or speed
-    exceeds LARGEST. Velocity and covariance may be NaN; the variance of the velocity may not.
+    Sizes are in [0, LARGEST_SIZE], scores and existence in [0, 1], variances at least 0, covariances symmetric and
+    nowhere negative, and no coordinate or speed exceeds LARGEST. Velocity and covariance may be NaN; the variance of
+    the velocity may not.
     """
     if not isinstance(detections, Detections):
         raise InvalidResult(extension, method, f"returned {describe(detections)} (expected Detections)")
@@ -72,6 +73,10 @@ def check_detections(extension: object, method: str, detections: object, *, now:
     raise_outside(extension, method, "velocity", detections.velocity, -LARGEST, LARGEST)
     raise_outside(extension, method, "covariance", detections.covariance, -(LARGEST**2), LARGEST**2)
     raise_outside(extension, method, "a variance", variances, 0.0, LARGEST**2)
+    impossible = detections.covariance[_are_impossible(detections.covariance)]
+    if len(impossible):
+        text = f"returned covariance with the value {impossible[0].tolist()}"
+        raise InvalidResult(extension, method, f"{text} (expected a symmetric matrix without negative eigenvalues)")
     raise_outside(extension, method, "velocity_variance", detections.velocity_variance, 0.0, LARGEST**2)
 
 
@@ -136,8 +141,15 @@ def _is_in_range(detections: Detections) -> bool:
         and not (np.abs(detections.velocity) > LARGEST).any()
         and not (np.abs(covariance) > LARGEST**2).any()
         and not (covariance.reshape(-1, 4)[:, ::3] < 0.0).any()
+        and not _are_impossible(covariance).any()
         and (not variance.size or (are_within(variance, LARGEST**2) and variance.min() >= 0.0))
     )
+
+
+def _are_impossible(covariance: Array) -> Bools:
+    """Return which matrices (N, 2, 2) of variances of at least 0 are no covariances; False for NaN."""
+    xx, xy, yx, yy = covariance.reshape(-1, 4).T.astype(float)
+    return np.asarray((np.abs(xy - yx) > _ROUNDING * (xx + yy)) | (xy * yx > (1.0 + _ROUNDING) * xx * yy))
 
 
 def _are_probabilities(values: Array) -> bool:

@@ -28,7 +28,9 @@ from eidrive_scenario.perception.tracking.motion_models import Estimates
 UNKNOWN_DEVIATION = 0.5
 """Standard deviation of positions for which the detector states no covariance [m]."""
 LEAST_DEVIATION = 0.05
-"""Standard deviation that is added to positions with a smaller one, such as 0 [m]."""
+"""Standard deviation that is added to positions with a smaller one, such as 0, and to singular covariances [m]."""
+SINGULAR = 1e-5
+"""Share of the determinant of a covariance in the product of its variances up to which it counts as singular."""
 
 
 def associate(
@@ -74,12 +76,13 @@ def make_plausible(covariance: Array) -> Bools:
 
     Return whether each was unknown (N,).
     """
-    xx, yy = covariance[:, 0, 0], covariance[:, 1, 1]
-    unknown: Bools = ~np.isfinite(xx + yy + covariance[:, 0, 1])
+    xx, xy, yy = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
+    unknown: Bools = ~np.isfinite(xx + yy + xy)
     if unknown.any():
         covariance[unknown, :2, :2] = UNKNOWN_DEVIATION**2 * np.eye(2)
     least = LEAST_DEVIATION**2
-    more = np.where(np.minimum(xx, yy) < least, least, 0.0)
+    is_singular = xy * xy >= (1.0 - SINGULAR) * xx * yy
+    more = np.where(is_singular | (np.minimum(xx, yy) < least), least, 0.0)
     xx += more
     yy += more
     return unknown

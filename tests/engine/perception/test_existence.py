@@ -1,4 +1,4 @@
-"""Probability of existence: closed forms, and calibration by simulated tracks."""
+"""Probability of existence: closed forms, and calibration by simulated tracks; plausible covariances."""
 
 from __future__ import annotations
 
@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.base.detections import Detections
-from eidrive_scenario.perception.tracking.association import detected, likelihood_ratio, missed, survived
+from eidrive_scenario.perception.tracking.association import (
+    detected,
+    likelihood_ratio,
+    make_plausible,
+    missed,
+    survived,
+)
 from eidrive_scenario.perception.tracking.method import TrackerSettings
 from eidrive_scenario.perception.tracking.tracker import Tracker
 
@@ -111,3 +117,20 @@ def test_existence_of_simulated_tracks_is_calibrated() -> None:
         inside = (existence >= low) & (existence <= high)
         assert inside.sum() > 200
         assert exists[inside].mean() == pytest.approx(existence[inside].mean(), abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("stated", "least"),
+    [
+        ([[0.09, 0.09], [0.09, 0.09]], 0.0025),
+        ([[0.288, 0.384], [0.384, 0.512]], 0.0025),
+        ([[0.09, 0.0], [0.0, 0.05**2]], 0.0025),
+        ([[0.09, 0.03], [0.03, 0.09]], 0.06),
+        ([[0.0, 0.0], [0.0, 0.0]], 0.0025),
+    ],
+)
+def test_make_plausible_raises_singular_covariances(stated: list[list[float]], least: float) -> None:
+    """Smallest eigenvalues: 0 is raised by 0.05², 0.0025 and 0.06 are unchanged."""
+    covariance = np.array([stated])
+    make_plausible(covariance)
+    assert float(np.linalg.eigvalsh(covariance)[0, 0]) == pytest.approx(least)

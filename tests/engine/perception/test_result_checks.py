@@ -48,8 +48,9 @@ def detections(time: Any = 1.0, **fields: Any) -> Detections:
         detections(boxes=BOX.astype(np.float32), scores=np.ones(1, int), tracks=(np.int64(3),)),
         detections(boxes=BOX * [1e7, 1e7, 1, 0, 0, 0, 1]),
         detections(scores=np.array([1.0 + 1e-7]), existence=np.zeros(1)),
+        detections(covariance=np.array([[[0.3, 0.1], [0.1, 1.0 / 30.0]]], np.float32)),
     ],
-    ids=["empty", "usual", "unknown velocity", "other types", "far points", "rounded score"],
+    ids=["empty", "usual", "unknown velocity", "other types", "far points", "rounded score", "singular covariance"],
 )
 def test_check_detections_accepts_finite_numbers(found: Detections) -> None:
     check_detections(Named(), "detect", found)
@@ -75,6 +76,8 @@ def test_check_detections_accepts_finite_numbers(found: Detections) -> None:
         (lambda: detections(existence=np.array([1.5])), "returned existence with the value 1.5"),
         (lambda: detections(velocity=np.array([[math.nan, 1e300]])), "returned velocity with the value 1e+300"),
         (lambda: detections(covariance=-np.ones((1, 2, 2))), "returned a variance with the value -1"),
+        (lambda: detections(covariance=np.array([[[0.1, 0.05], [0, 0.1]]])), "returned covariance with the value [["),
+        (lambda: detections(covariance=np.array([[[0.1, 0.3], [0.3, 0.1]]])), "returned covariance with the value [["),
         (lambda: detections(covariance=np.full((1, 2, 2), 1e300)), "returned covariance with the value 1e+300"),
         (lambda: detections(velocity_variance=np.array([-1.0])), "returned velocity_variance with the value -1"),
         (lambda: detections(velocity_variance=np.array([math.nan])), "returned velocity_variance with the value nan"),
