@@ -214,6 +214,7 @@ def fit_box(
     classes: Sequence[str],
     hidden: tuple[bool, bool] = (False, False),
     cut: tuple[bool, bool] = (False, False),
+    cut_above: bool = False,
     heading: float | None = None,
     heading_cost: Callable[[float], float] | None = None,
 ) -> Fit:
@@ -223,6 +224,7 @@ def fit_box(
     ground   height of the ground below the object [m]; the box stands on it
     hidden   whether something nearer hides the left and the right end of the object, as viewed from the sensor
     cut      whether the field of view of the sensor ends there
+    cut_above  whether it ends at the top of the points
     heading  expected heading of the length [rad]; used if there are too few points to determine one
     heading_cost  squared deviations of a heading of the length from other information; None is the deviation from
              `heading`
@@ -235,7 +237,7 @@ def fit_box(
     """
     x, y = points[:, :2].mean(axis=0).tolist()
     top = float(points[:, 2].max()) - ground
-    highest = _highest(points, sensor_height, top, ground, pattern)
+    highest = math.inf if cut_above else _highest(points, sensor_height, top, ground, pattern)
     shapes = rectangles(points[:, :2])
     shapeless = shapes[0].widest < SHAPELESS
     axes: tuple[int, ...] = (0, 1)
@@ -413,8 +415,6 @@ def _highest(points: Array, sensor_height: float, top: float, ground: float, pat
     x, y, z = points[int(np.argmax(points[:, 2]))].tolist()
     reach = math.hypot(x, y)
     elevation = math.atan2(z - sensor_height, max(reach, 1e-6))
-    if elevation > pattern.highest - 0.5 * pattern.elevation:
-        return math.inf
     return max(sensor_height - ground + reach * math.tan(elevation + pattern.elevation), top)
 
 

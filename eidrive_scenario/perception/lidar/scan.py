@@ -50,6 +50,10 @@ class Scan:
             standing[standing] = keep(self.frame.to_world(points[standing, :2]))
         self.points = points[standing]
         self._ground = ground[standing]
+        rays = reading.points[standing]
+        # Unlike bearings and heights, both refer to the frame of the sensor, as its field of view does.
+        self._azimuth = np.arctan2(rays[:, 1], rays[:, 0])
+        self._elevation = np.arctan2(rays[:, 2], np.hypot(rays[:, 0], rays[:, 1]))
         self._bearing = np.arctan2(self.points[:, 1], self.points[:, 0])
         self._distance = np.hypot(self.points[:, 0], self.points[:, 1])
 
@@ -69,6 +73,7 @@ class Scan:
         points = self.points[rows]
         if math.hypot(*np.ptp(points[:, :2], axis=0).tolist()) > math.hypot(LARGEST[0], LARGEST[1]):
             return None
+        border = self.pattern.highest - 0.5 * self.pattern.elevation
         return fit_box(
             points,
             sensor_height=self.frame.height,
@@ -77,6 +82,7 @@ class Scan:
             classes=classes,
             hidden=self._hidden(rows),
             cut=self._cut(rows),
+            cut_above=bool(self._elevation[rows[np.argmax(points[:, 2])]] > border),
             heading=heading,
             heading_cost=heading_cost,
         )
@@ -86,8 +92,10 @@ class Scan:
         border = self.pattern.half_field - BESIDE * self.pattern.azimuth
         if self.pattern.half_field >= math.pi:
             return False, False
+        at_border = np.abs(self._azimuth[rows]) > border
         bearing = self._bearing[rows]
-        return bool(bearing.max() > border), bool(bearing.min() < -border)
+        left, right = np.argmax(bearing), np.argmin(bearing)
+        return bool(at_border[left] and bearing[left] > 0.0), bool(at_border[right] and bearing[right] < 0.0)
 
     def _hidden(self, rows: Integers) -> tuple[bool, bool]:
         """Return whether something nearer is directly beside the left and the right end of these points."""

@@ -145,6 +145,16 @@ def test_detect_from_mast_returns_cars(street: Any) -> None:
         assert iou_bev(found.boxes[row : row + 1], car.box[None])[0, 0] > 0.6
 
 
+@pytest.mark.parametrize(("x", "y"), [(10.0, 2.0), (12.0, 10.0)])
+def test_pitched_lidar_completes_the_height_of_cut_cars(street: Any, x: float, y: float) -> None:
+    """Its highest ring points 10° downwards, from 1.9 m: it shows the lower part of the car."""
+    car = street.thing("Car", x, y)
+    pitched = LidarSettings.model_validate({"range_noise": 0.0, "mount": [0.0, 0.0, 1.9, 0.0, 20.0]})
+    found = detect(street.readings([street.thing("Ego", 0, 0), car], {"roof": pitched}))
+    assert found.classes == ("car",)
+    assert found.boxes[0, 5] == pytest.approx(car.box[5], abs=0.15)
+
+
 def test_detect_partly_hidden_car_is_completed_behind_truck(street: Any) -> None:
     """Only its front half is visible: the box extends behind the truck."""
     objects = [
