@@ -23,6 +23,8 @@ from eidrive_scenario.fusion.tracks import TRACK, predict_tracks, rows_of
 
 _BATCH = 16
 """Maximum number of receiving stations whose tracks are processed at once, so that their arrays fit in the cache."""
+_WEIGHTLESS = 1e12
+"""Variance of velocities that are not reported, and are not fused with those that are [m²/s²]."""
 
 
 class CovarianceIntersectionSettings(Settings):
@@ -216,6 +218,7 @@ def _fuse_states(tracks: Table, objects: Objects, gate: float) -> tuple[Array, A
     covariance = np.empty((len(tracks), 2, 2, 2))
     covariance[:, 0] = tracks["covariance"][:, :2, :2] + tracks["pose"]
     covariance[:, 1] = tracks["covariance"][:, 2:, 2:]
+    covariance[~tracks["moving"], 1] = _WEIGHTLESS * np.eye(2)
     states = estimates(tracks["mean"].reshape(-1, 2, 2), covariance)
     members, starts = objects
     while len(members) > len(starts):

@@ -54,6 +54,12 @@ def test_fuse_single_current_report_is_unchanged(report: Make, fuse: Fuse) -> No
     assert np.isnan(fuse([report("A", 1.0, [(10.0, 3.0)])], 1.0).velocity).all()
 
 
+def test_fuse_keeps_fast_velocity_beside_report_without_one(report: Make, fuse: Fuse) -> None:
+    fast = report("A", 1.0, [(10.0, 3.0)], velocity=(60.0, 0.0))
+    both = fuse([fast, report("B", 1.0, [(10.0, 3.0)])], 1.0)
+    np.testing.assert_allclose(both.velocity, [[60.0, 0.0]], atol=1e-3)
+
+
 @pytest.mark.parametrize(("height", "objects"), [(0.0, 1), (2.5, 1), (6.5, 2)])
 def test_fuse_keeps_cars_on_and_below_a_bridge_separate(report: Make, fuse: Fuse, height: float, objects: int) -> None:
     """Errors of the height of a box by 2.5 m do not split a car."""
