@@ -280,9 +280,8 @@ def _coast(tracks: Table, missed: NDArray[np.bool_], reports: Sequence[Report]) 
     Tracks of stations with incomplete reports are unchanged.
     """
     complete = np.array([report.complete for report in reports])
-    tracked = np.array([bool(report.detections.tracks) for report in reports])
     rows = np.flatnonzero(missed & complete[tracks["station"]])
     before = np.minimum(tracks["existence"][rows], 0.999)
-    after = np.where(tracked[tracks["station"][rows]], 0.0, after_miss(before))
+    after = np.where(tracks["number"][rows] >= 0, 0.0, after_miss(before))
     tracks["existence"][rows] = after
     tracks["score"][rows] *= np.divide(after, before, out=np.zeros(len(rows)), where=before > 0.0)

@@ -282,8 +282,10 @@ def test_fuse_removes_objects_after_missed_detections(report: Make) -> None:
 
 
 def test_fuse_removes_objects_that_a_tracking_station_dropped(report: Make, fuse: Fuse) -> None:
-    both = report("A", 0.0, [(10.0, 0.0), (20.0, 0.0)], tracks=(1, 2))
-    assert len(fuse([both, report("A", 0.05, [(20.0, 0.0)], tracks=(2,))], 0.05)) == 1
+    both = report("A", 0.0, [(10.0, 0.0), (20.0, 0.0)], tracks=(1, 2), score=0.999)
+    rest = report("A", 0.05, [(20.0, 0.0)], tracks=(2,), score=0.999)
+    assert len(fuse([both, rest], 0.05)) == 1
+    assert len(fuse([both, rest, report("A", 0.1, [])], 0.1)) == 0, "no object is left"
 
 
 def test_fuse_keeps_objects_omitted_in_incomplete_reports(report: Make, fuse: Fuse) -> None:
