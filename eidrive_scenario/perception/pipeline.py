@@ -11,7 +11,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.base.detections import Detections
+from eidrive_scenario.base.detections import VULNERABLE, Detections
 from eidrive_scenario.base.geometry import on_two_levels
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.errors import InvalidResult
@@ -26,12 +26,12 @@ from eidrive_scenario.sensing.readings import FIELDS, Readings, SignalReading
 
 BODY_MARGIN = 0.9
 """Maximum distance of a detected box center from the outline of a body at which the box shows this body [m]. It is half
-the width of a car: the center of another car is closer only after a collision."""
+the width of a car: the center of another car is closer only after a collision. That of a pedestrian may be."""
 
 
 class Outline(NamedTuple):
-    """Outline of a body with the margin: center [m], cosine and sine of its heading, half length and half width, and
-    height of the center and of the body [m]."""
+    """Outline of a body with the margin: center [m], cosine and sine of its heading, half length and half width, height
+    of the center and of the body [m], and whether it is a vulnerable road user."""
 
     x: float
     y: float
@@ -41,6 +41,7 @@ class Outline(NamedTuple):
     half_width: float
     z: float
     height: float
+    is_vulnerable: bool = False
 
 
 def outlines(bodies: Array) -> list[Outline]:
@@ -52,12 +53,18 @@ def outlines(bodies: Array) -> list[Outline]:
 
 
 def rows_on_bodies(detections: Detections, bodies: Sequence[Outline]) -> list[int]:
-    """Return the rows of the detections whose centers are on bodies on their level, or within the margin of them."""
+    """Return the rows of the detections whose centers are on bodies on their level, or within the margin of them.
+
+    Vulnerable road users within the margin are others, unless the body is one.
+    """
     rows = []
     for row, (bx, by, bz, _, _, tall, _) in enumerate(detections.boxes.tolist()):
-        for x, y, cos, sin, half_length, half_width, z, height in bodies:
+        is_vulnerable = detections.classes[row] in VULNERABLE
+        for x, y, cos, sin, half_length, half_width, z, height, is_alike in bodies:
             ahead, left = cos * (bx - x) + sin * (by - y), cos * (by - y) - sin * (bx - x)
-            if abs(ahead) <= half_length and abs(left) <= half_width and not on_two_levels(z, height, bz, tall):
+            beyond = max(abs(ahead) - half_length, abs(left) - half_width)
+            limit = -BODY_MARGIN if is_vulnerable and not is_alike else 0.0
+            if beyond <= limit and not on_two_levels(z, height, bz, tall):
                 rows.append(row)
                 break
     return rows

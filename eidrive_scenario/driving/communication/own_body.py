@@ -77,7 +77,8 @@ class OwnBody:
         cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
         ahead, aside, up = self._spec.offset
         x, y = x + cos * ahead - sin * aside, y + sin * ahead + cos * aside
-        body = Outline(x, y, cos, sin, *self._half_size, z + up, self._spec.size[2])
+        is_vulnerable = self._spec.category in VULNERABLE
+        body = Outline(x, y, cos, sin, *self._half_size, z + up, self._spec.size[2], is_vulnerable)
         trailers = outlines(attached) if len(attached) else ()
         driven = 0.0
         if self._poses:
