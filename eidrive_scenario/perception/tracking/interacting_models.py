@@ -181,13 +181,17 @@ class InteractingModels:
             velocity = velocity - np.where(recent & (np.square(drift) < least), drift, 0.0)[:, None] * across
         return np.asarray(probability[:, None] * velocity)
 
-    def velocity_variance(self, tracks: Tracks, velocity: Array) -> Array:
-        """Return the mean squares (N,) of the errors of these velocities (N, 2) in each axis [m²/s²]."""
+    def velocity_variance(self, tracks: Tracks, velocity: Array, recent: Bools) -> Array:
+        """Return the mean squares (N,) of the errors of these velocities (N, 2) in each axis [m²/s²].
+
+        recent  whether objects (N,) have been detected in few scans: that they stand is not likelier than at first
+        """
         moves = Estimates(tracks.state[MOVES], tracks.covariance[MOVES])
         squares = np.stack([np.square(velocity), np.square(velocity - self._base.velocity(moves.state))])
         for axis, direction in enumerate(np.eye(2)):
             squares[MOVES, :, axis] += self._base.speed_variance(moves, np.tile(direction, (len(velocity), 1)))
-        return np.asarray((tracks.probability * squares.mean(axis=2)).sum(axis=0))
+        moving = np.where(recent, np.maximum(tracks.probability[MOVES], 0.5), tracks.probability[MOVES])
+        return np.asarray((np.stack([1.0 - moving, moving]) * squares.mean(axis=2)).sum(axis=0))
 
     def course(self, tracks: Tracks) -> Array:
         """Return the directions (N,) in which objects certainly move [rad], NaN for others.

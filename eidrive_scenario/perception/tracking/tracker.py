@@ -357,7 +357,7 @@ class Tracker(TrackingMethod):
             covariance[:, :2, :2],
             tuple([history.number or 0 for history in histories]),
             existence,
-            velocity_variance=self._filter.velocity_variance(tracks, velocity),
+            velocity_variance=self._filter.velocity_variance(tracks, velocity, recent),
         )
 
 

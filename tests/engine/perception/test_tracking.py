@@ -35,6 +35,11 @@ def cars(time: float, *places: tuple[float, ...], deviation: float = 0.1, names:
     )
 
 
+def squared_error(held: Detections, speed: float) -> float:
+    """Return half the squared error of the velocity of a car that drives along the x axis."""
+    return float(np.square(held.velocity[0] - (speed, 0.0)).sum()) / 2.0
+
+
 def tracker(kind: Any = "cv", **settings: Any) -> Tracker:
     return Tracker(TrackerSettings(kind=kind, **settings))
 
@@ -439,6 +444,21 @@ def test_variance_of_velocity_covers_the_error_of_a_new_track(kind: str) -> None
     for scan in range(30):
         confirmed = track.update(cars(DT * scan, (0.0, 0.0), deviation=0.5))
     assert confirmed.velocity_variance[0] < 0.25
+
+
+@pytest.mark.parametrize("kind", ["cv", "ctrv"])
+@pytest.mark.parametrize("speed", [1.0, 3.0, 10.0])
+def test_new_tracks_have_consistent_variances_of_velocities(kind: str, speed: float) -> None:
+    """The mean squared error of the first four velocities, most of which are 0, is at most twice the stated one."""
+    errors: list[list[float]] = []
+    for seed in range(20):
+        track, noise = tracker(kind), np.random.default_rng(seed).normal(0.0, 0.3, (5, 2))
+        scans = [
+            track.update(cars(DT * scan, (x + speed * DT * scan, y), deviation=0.3))
+            for scan, (x, y) in enumerate(noise)
+        ]
+        errors.append([squared_error(held, speed) / held.velocity_variance[0] for held in scans[1:] if len(held)])
+    assert max(np.mean(column) for column in zip(*errors, strict=True)) < 2.0
 
 
 @pytest.mark.parametrize("yaw", [0.0, math.pi / 2.0])
