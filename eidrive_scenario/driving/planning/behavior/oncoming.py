@@ -42,7 +42,8 @@ is that small over the longest one until then: few say little about the next one
 LEAST_HEADWAY = 1.0
 """Difference between expected arrivals that belong to different vehicles [s]."""
 SLOWEST = 0.5
-"""Share of the wanted speed that traffic out of view is expected to drive at least."""
+"""Share of the wanted speed that traffic out of view is expected to drive at least, and of the greatest speed in view
+with which a vehicle in view is expected to arrive at least."""
 FREE_TIME = 1.0
 """Time without an obstruction after which the vehicle does not wait any more [s]."""
 FARTHEST = 150.0
@@ -163,7 +164,9 @@ class OncomingTraffic:
             if self._free_to == math.inf:
                 self._free_to = -math.inf
             self._fastest = max(self._fastest, -float(scene.speed[is_oncoming, 0].min()))
-            arrival = now + float(((scene.front[is_oncoming, 0] - center) / -scene.speed[is_oncoming, 0]).min())
+            # A vehicle that stops comes ever later, and is not another one.
+            speed = np.maximum(-scene.speed[is_oncoming, 0], SLOWEST * self._fastest)
+            arrival = now + float(((scene.front[is_oncoming, 0] - center) / speed).min())
             headway = arrival - self._arrival
             if LEAST_HEADWAY < headway < math.inf:
                 self._headways += 1

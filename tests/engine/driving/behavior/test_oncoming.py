@@ -145,6 +145,16 @@ def test_pause_is_longer_after_vehicles_with_long_headways(headways: int, longes
         assert observed.yields(outlook, (1.4, 0.0), is_last_place=True, has_view=True) is expected
 
 
+def test_vehicle_that_stops_does_not_lengthen_the_pause() -> None:
+    """A car brakes with 2 m/s² from 10 m/s, and stands from 5 s on."""
+    observed = traffic(80.0)
+    for now in np.arange(0.0, 6.05, 0.1):
+        speed = max(10.0 - 2.0 * now, 0.0)
+        place = 70.0 - (25.0 - speed**2 / 4.0)
+        observed.observe(scene((place, 3.5, -speed)), 0.0, 10.0, float(now), held_up=True)
+    assert observed.hidden_speed(BESIDE, 5.0 + PAUSE + 0.1) == 10.0
+
+
 def test_column_with_short_headways_does_not_lengthen_the_pause() -> None:
     observed = traffic(80.0)
     for now in np.arange(0.0, 12.05, 0.1):
