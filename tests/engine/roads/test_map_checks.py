@@ -299,4 +299,5 @@ def test_corpus_maps_have_only_known_warnings(corpora: Path) -> None:
         ("Town03.xodr", "lane-link"): [7913, 8040],
         ("Town06.xodr", "geometry-gap"): [14443],
         ("parking_demo.xodr", "lane-link"): [564],
+        ("parking_demo.xodr", "object-off-road"): [301],
     }
