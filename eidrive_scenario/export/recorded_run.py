@@ -13,8 +13,7 @@ from msgspec import structs
 
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.files.bounded import load_json
-from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.in_flight import MessagesInFlight
+from eidrive_scenario.recording.frame import Frame, MessagesInFlight
 from eidrive_scenario.recording.recording import Recording, open_recording
 from eidrive_scenario.recording.run_files import ROAD_FILE, recording_in
 from eidrive_scenario.roads import RoadNetwork

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import msgspec
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.errors import quoted
 from eidrive_scenario.storyboard.state.element_states import StateChange
@@ -108,3 +110,25 @@ def check_frame(frame: Frame) -> None:
     for name, step in frame.steps.items():
         if not all(0 <= row < len(step.inbox) for row in step.expired):
             raise ValueError(f"expired messages of {name} were not received (got rows {list(step.expired)[:5]})")
+
+
+class MessagesInFlight:
+    """Messages that have not arrived; they are lost if their receiver leaves, though their outcome was `delivered`."""
+
+    def __init__(self) -> None:
+        self._events: list[LinkEvent] = []
+        self._time = -math.inf
+
+    def observe(self, frame: Frame) -> list[LinkEvent]:
+        """Add a frame; return the events of the messages to stations that have left since the last one."""
+        before = self._time
+        # As in Links.deliver: a message is delivered after its arrival and after the instant of its sending
+        undelivered = [
+            event
+            for event in (*self._events, *frame.links)
+            if event.arrives is not None
+            and (event.arrives > before + TIME_TOLERANCE or event.sent > before - TIME_TOLERANCE)
+        ]
+        self._time = frame.view.time
+        self._events = [event for event in undelivered if event.receiver in frame.view]
+        return [event for event in undelivered if event.receiver not in frame.view]

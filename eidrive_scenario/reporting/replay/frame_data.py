@@ -14,8 +14,7 @@ from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.errors import counted
-from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.recording.in_flight import MessagesInFlight
+from eidrive_scenario.recording.frame import Frame, MessagesInFlight
 from eidrive_scenario.recording.integrity import DamageReport
 from eidrive_scenario.reporting.drawing.canvas import ellipse_of_95_percent
 from eidrive_scenario.reporting.replay.light import LightChanges

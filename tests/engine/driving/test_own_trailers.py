@@ -48,10 +48,10 @@ def test_centers_on_a_body_or_within_the_margin_are_on_it() -> None:
 @pytest.mark.parametrize("kind", ["pedestrian", "bicycle"])
 def test_vulnerable_road_users_beside_a_body_are_others(kind: str) -> None:
     """A pedestrian walks 0.1 m beside a side at 1.25 m; for the body of one, the margin applies."""
-    found = replace(seen((-9.0, 1.2), (-9.0, 1.35), (-3.2, 0.0)), classes=(kind,) * 3)
+    detections = replace(seen((-9.0, 1.2), (-9.0, 1.35), (-3.2, 0.0)), classes=(kind,) * 3)
     (trailer,) = outlines(TRAILER)
-    assert rows_on_bodies(found, [trailer]) == [0]
-    assert rows_on_bodies(found, [trailer._replace(is_vulnerable=True)]) == [0, 1, 2]
+    assert rows_on_bodies(detections, [trailer]) == [0]
+    assert rows_on_bodies(detections, [trailer._replace(is_vulnerable=True)]) == [0, 1, 2]
 
 
 def test_received_trailer_is_removed_at_its_place_of_the_measurement(car: ActorSpec) -> None:

@@ -150,9 +150,9 @@ def test_pitched_lidar_completes_the_height_of_cut_cars(street: Any, x: float, y
     """Its highest ring points 10° downwards, from 1.9 m: it shows the lower part of the car."""
     car = street.thing("Car", x, y)
     pitched = LidarSettings.model_validate({"range_noise": 0.0, "mount": [0.0, 0.0, 1.9, 0.0, 20.0]})
-    found = detect(street.readings([street.thing("Ego", 0, 0), car], {"roof": pitched}))
-    assert found.classes == ("car",)
-    assert found.boxes[0, 5] == pytest.approx(car.box[5], abs=0.15)
+    detections = detect(street.readings([street.thing("Ego", 0, 0), car], {"roof": pitched}))
+    assert detections.classes == ("car",)
+    assert detections.boxes[0, 5] == pytest.approx(car.box[5], abs=0.15)
 
 
 def test_detect_partly_hidden_car_is_completed_behind_truck(street: Any) -> None:

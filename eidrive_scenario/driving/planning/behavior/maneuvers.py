@@ -15,7 +15,7 @@ from eidrive_scenario.base.detections import VULNERABLE
 from eidrive_scenario.driving.planning.behavior.lane_changes import LaneChange
 from eidrive_scenario.driving.planning.behavior.memory import ON_FOOT, STILL, KnownObject
 from eidrive_scenario.driving.planning.behavior.merging import TrafficBehind, has_gap_now
-from eidrive_scenario.driving.planning.behavior.prediction import NOTICEABLE, Prediction
+from eidrive_scenario.driving.planning.behavior.prediction import ASIDE, NOTICEABLE, Prediction
 from eidrive_scenario.driving.planning.behavior.proposals import (
     AT_OFFSET,
     BEFORE_ZONE,
@@ -236,8 +236,6 @@ LONG = 15.0
 """Time after which a vehicle in the middle of the lane counts as parked [s]; before, the vehicle waits behind it."""
 WAITING = 1.0
 """Speed below which the vehicle waits [m/s]."""
-ASIDE = 0.8
-"""Offset from the route from which on a standing vehicle is parked at the edge of the lane [m]."""
 SETTING_OFF = 5.0
 """Time for which a vehicle may still accelerate after it starts [s]; it is not passed meanwhile."""
 SWUNG = 0.3
@@ -340,11 +338,10 @@ def passing_profiles(
         if moves:
             one_lane = math.isnan(beside.left) and math.isnan(beside.right)
             solid = any(lanes.has_solid_line for lanes in (beside, *obstacle.beside))
-            may_cross = not solid and returns and obstacle.end < situation.junction - BEFORE_JUNCTION
             # The vehicle brakes for the end of the route ahead of what it has overtaken, which it expects to drive on.
             braking = situation.wanted**2 / (2.0 * situation.settings.comfortable_deceleration)
-            ahead = max(obstacle.fastest * situation.settings.horizon, braking)
-            may_cross = may_cross and obstacle.end + ahead < situation.end
+            ends = situation.end - max(obstacle.fastest * situation.settings.horizon, braking)
+            may_cross = not solid and returns and obstacle.end < min(situation.junction - BEFORE_JUNCTION, ends)
             sides = (overtaking,) if one_lane else ()
         around = [_around(situation, scene, obstacle, side) for side in sides]
         profiles += [profile for profile in around if profile and (may_cross or not profile.uses_oncoming)]

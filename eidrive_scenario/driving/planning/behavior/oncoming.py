@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools
-from eidrive_scenario.driving.planning.behavior.prediction import LANE_WIDTH
+from eidrive_scenario.driving.planning.behavior.prediction import ASIDE, LANE_WIDTH
 from eidrive_scenario.driving.planning.behavior.proposals import (
     AT_OFFSET,
     ONCOMING_SPEED,
@@ -64,9 +64,6 @@ is not given up for the noise of a motion."""
 NARROW = 1.0
 """Distance between an object and the center of the oncoming lane below which traffic has to slow down for it [m]: half
 the width of a car."""
-IN_MIDDLE = 0.8
-"""Distance from the center of the oncoming lane within which a standing vehicle blocks it [m]: no other passes it there
-before the vehicle has left the lane."""
 VIEWPOINT, TARGET = 1.5, 1.0
 """Heights of sensor and traffic above the road for the view over a crest [m]."""
 BRAKING = 3.0
@@ -296,7 +293,7 @@ class OncomingTraffic:
         beside_line = profile.offset(viewpoints)
         here = (float(viewpoints[0]), float(beside_line[0]))
         # Traffic out of view behind that in view does not come before it, nor before what has stopped beyond the end.
-        centered = np.abs(scene.d[:, 0] - outlook.beside.oncoming) < IN_MIDDLE
+        centered = np.abs(scene.d[:, 0] - outlook.beside.oncoming) < ASIDE
         has_stopped = centered & (np.abs(scene.speed[:, 0]) <= ONCOMING_SPEED) & (scene.rear[:, 0] > end)
         nearest: Array = scene.front[traffic | has_stopped].min(axis=0, initial=math.inf)
         free = self._free(outlook, here, until, end, float(nearest[0]))

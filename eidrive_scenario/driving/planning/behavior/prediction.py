@@ -33,6 +33,8 @@ a velocity from noisy positions."""
 CUTTING, STILL_CUTTING = 0.15, 0.3
 """Angle between the motion of a vehicle and its lane in a junction up to which it cuts the curve, and that up to which
 one that has been predicted to follow the lane still does [rad]; choices."""
+ASIDE = 0.8
+"""Offset from the center of a lane from which on a standing vehicle is parked at its edge [m]."""
 LANE_WIDTH = 3.5
 """Width of a lane [m], after which a lane change is predicted to end."""
 NOTICEABLE, GREATEST = 0.8, 4.0

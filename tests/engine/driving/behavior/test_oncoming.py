@@ -150,8 +150,8 @@ def test_vehicle_that_stops_does_not_lengthen_the_pause() -> None:
     observed = traffic(80.0)
     for now in np.arange(0.0, 6.05, 0.1):
         speed = max(10.0 - 2.0 * now, 0.0)
-        place = 70.0 - (25.0 - speed**2 / 4.0)
-        observed.observe(scene((place, 3.5, -speed)), 0.0, 10.0, float(now), held_up=True)
+        distance = 45.0 + speed**2 / 4.0
+        observed.observe(scene((distance, 3.5, -speed)), 0.0, 10.0, float(now), held_up=True)
     assert observed.hidden_speed(BESIDE, 5.0 + PAUSE + 0.1) == 10.0
 
 
