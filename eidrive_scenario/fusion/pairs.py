@@ -13,15 +13,11 @@ from numpy.typing import NDArray
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.base.assignment import assign
 from eidrive_scenario.base.geometry import on_two_levels
+from eidrive_scenario.perception.tracking.association import UNASSIGNED_GATE
 
 Table = NDArray[np.void]
 """Structured array of tracks; see `fusion.tracks.TRACK`."""
 
-UNASSIGNED_GATE = -2.0 * math.log(1e-6)
-"""Maximum squared Mahalanobis distance of pairs of tracks without a partner within the gate.
-
-One true pair in a hundred is outside a gate of 99 %, which would split objects many times per second.
-"""
 _MAX_COORDINATE = 1e7
 """Maximum coordinate in the search by position [m], which rounding would affect beyond."""
 CERTAIN = -1e3

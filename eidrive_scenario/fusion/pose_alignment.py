@@ -31,10 +31,10 @@ from eidrive_scenario.base.detections import CLASSES, VULNERABLE, Detections
 from eidrive_scenario.base.geometry import on_two_levels, wrap_angle
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.fusion.method import Report
-from eidrive_scenario.fusion.pairs import UNASSIGNED_GATE, AssociationGate, Table
+from eidrive_scenario.fusion.pairs import AssociationGate, Table
 from eidrive_scenario.fusion.report_history import ReportHistory
 from eidrive_scenario.fusion.tracks import TRACK, initiate_tracks, predict_tracks
-from eidrive_scenario.perception.tracking.association import squared_mahalanobis
+from eidrive_scenario.perception.tracking.association import UNASSIGNED_GATE, squared_mahalanobis
 from eidrive_scenario.perception.tracking.uncertain_pose import pose_covariance_at, pose_jacobian
 from eidrive_scenario.v2x.messages.message import StationState
 

@@ -13,9 +13,10 @@ from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import VULNERABLE, Detections
 from eidrive_scenario.base.geometry import on_two_levels
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
-from eidrive_scenario.fusion.pairs import UNASSIGNED_GATE, AssociationGate
+from eidrive_scenario.fusion.pairs import AssociationGate
 from eidrive_scenario.fusion.tracks import pose_part
 from eidrive_scenario.perception.pipeline import BODY_MARGIN, Outline, outlines, rows_on_bodies, without_rows
+from eidrive_scenario.perception.tracking.association import UNASSIGNED_GATE
 from eidrive_scenario.sensing.readings import NOTHING_ATTACHED, EgoState
 from eidrive_scenario.v2x.messages.message import StationState
 from eidrive_scenario.world.actor import ActorSpec

@@ -461,6 +461,22 @@ def test_new_tracks_have_consistent_variances_of_velocities(kind: str, speed: fl
     assert max(np.mean(column) for column in zip(*errors, strict=True)) < 2.0
 
 
+@pytest.mark.parametrize("kind", ["cv", "ctrv"])
+@pytest.mark.parametrize("step", [0.05, 0.1])
+@pytest.mark.parametrize("deviation", [0.1, 0.3])
+def test_fast_vehicles_are_tracked_from_their_third_scan(kind: str, step: float, deviation: float) -> None:
+    """Two cars side by side at 42 m/s, and an oncoming one. Three boxes with errors of s at intervals of T determine a
+    velocity to s / (√2 T), which is 4.2 m/s at most; the assumed speed of new objects draws it towards 0."""
+    rng, track = np.random.default_rng(1), tracker(kind)
+    for scan in range(3):
+        x = 42.0 * step * scan
+        places = np.array([(x, 0.0, 0.0), (x, 3.5, 0.0), (90.0 - x, 7.0, math.pi)])
+        places[:, :2] += rng.normal(0.0, deviation, (3, 2))
+        held = track.update(cars(step * scan, *places.tolist(), deviation=deviation))
+    assert len(held) == 3
+    assert sorted(held.velocity[:, 0].tolist()) == pytest.approx([-42.0, 42.0, 42.0], abs=12.0)
+
+
 @pytest.mark.parametrize("yaw", [0.0, math.pi / 2.0])
 def test_new_vehicle_moves_across_its_axis_only_if_that_is_certain(yaw: float) -> None:
     """Successive boxes differ by -0.75 m in x and, by an error of one deviation, 0.2 m in y within 0.05 s: 15 and 4
