@@ -184,6 +184,20 @@ def test_late_vehicle_on_its_trajectory_catches_up_within_its_performance(scene:
     assert played.at(5.5).x == pytest.approx(160.0 + 20.0 * 5.5, abs=0.1)
 
 
+@pytest.mark.parametrize("dt", [0.01, 0.05])
+@pytest.mark.parametrize("behind", [0.5, 10.0, 30.0])
+def test_vehicle_behind_a_timed_trajectory_catches_up_within_its_performance(
+    scene: RunScene, behind: float, dt: float
+) -> None:
+    """It gains 10 m/s per second until half of the distance, then loses as much: at most √(10 · distance) faster."""
+    way = [(100.0 + behind, -2.0, 0.0), (400.0 + behind, -2.0, 15.0)]
+    played = scene(6, ("Ego", follow_points(way, "follow")), dt=dt)
+    speeds = [row["Ego"].speed for row in played.rows]
+    assert all(abs(after - before) < 10.0 * dt + 1e-6 for before, after in pairwise(speeds))
+    assert max(speeds) == pytest.approx(20.0 + math.sqrt(10.0 * behind), abs=0.5)
+    assert played.at(5.5).x == pytest.approx(100.0 + behind + 20.0 * 5.5, abs=0.1)
+
+
 def test_vehicle_beside_the_curve_ahead_of_its_start_does_not_turn_back(scene: RunScene) -> None:
     played = scene(4, ("Ego", follow_points([(60.0, -2.0, None), (400.0, -2.0, None)], "follow")), dt=0.05)
     assert {row["Ego"].y for row in played.rows} == {-2.0}

@@ -346,7 +346,7 @@ class FollowTrajectoryAction(ActionBehaviour):
             if pursuit.on_path and not self._is_late:
                 self._run.keep(wanted, dt)
             else:
-                self._is_late &= abs(self._run.advance(wanted, dt) - wanted) > EPSILON
+                self._is_late = abs(self._run.advance(wanted, dt) - wanted) > EPSILON or not pursuit.on_path
             motion.set_speed(way * self._run.rate)
         pose = pursuit.advance(way * motion.speed * dt, dt, tail_first=way < 0)
         self._s = pursuit.s
