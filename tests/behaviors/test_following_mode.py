@@ -47,6 +47,24 @@ def test_speed_step_in_follow_mode_takes_the_vehicle_time(scene: RunScene) -> No
     assert scene(1, ("Ego", speed(25, "step", 0, "position"))).at(0.1).speed == 25.0
 
 
+@pytest.mark.element("SpeedAction")
+@pytest.mark.parametrize("dt", [0.01, 0.05])
+@pytest.mark.parametrize(("shape", "time"), [("step", 0), ("linear", 5), ("cubic", 6), ("sinusoidal", 5)])
+@pytest.mark.parametrize("target", [5.0, 35.0])
+def test_speed_change_limited_by_its_jerk_does_not_overshoot(
+    scene: RunScene, target: float, shape: str, time: float, dt: float
+) -> None:
+    """15 m/s at 1 m/s³ take at least 2 √(15 / 1) s = 7.75 s, longer than requested."""
+    rates = 'maxAccelerationRate="1" maxDecelerationRate="1"'
+    played = scene(10, ("Ego", speed(target, shape, time, "follow")), dt=dt, performance=rates)
+    speeds = [row["Ego"].speed for row in played.rows]
+    assert speeds == sorted(speeds, reverse=target < 20.0)
+    accelerations = [(after - before) / dt for before, after in pairwise(speeds)]
+    assert max(abs(after - before) for before, after in pairwise(accelerations)) <= dt + 1e-6
+    assert speeds[-1] == pytest.approx(target)
+    assert played.when("action 0", "completeState") == pytest.approx(2.0 * math.sqrt(15.0), abs=0.1)
+
+
 def test_limited_speed_respects_the_jerk_of_the_performance() -> None:
     """By 10 m/s at most 2 m/s² and 4 m/s³: 0.5 s to build up, 0.5 s to reduce, 10 / 2 + 2 / 4 s in total."""
     car = model.Performance(

@@ -83,21 +83,37 @@ class RateLimitedValue:
         self.rate = (value - self.value) / dt
         self.value = self._target = value
 
-    def advance(self, wanted: float, dt: float) -> float:
-        """Return the value dt later, with the target at `wanted` by then."""
+    def advance(self, wanted: float, dt: float, final: float | None = None) -> float:
+        """Return the value dt later, with the target at `wanted` by then.
+
+        The target moves on to `final` and stops there, so that the value does not pass it. Without `final` the target
+        keeps its rate. The motion of a target is followed exactly while the bounds allow that.
+        """
         target_rate = (wanted - self._target) / dt
         self._target = wanted
         exact = (wanted - self.value) / dt
         low, high = max(self.rate - self.down * dt, self.lowest), min(self.rate + self.up * dt, self.highest)
+        least, most = self._stopping_rates(final, dt)
         settles = -self.down * dt - TINY <= target_rate - exact <= self.up * dt + TINY
-        if low - TINY <= exact <= high + TINY and settles:
+        stops = final == wanted or least - TINY <= exact <= most + TINY
+        if low - TINY <= exact <= high + TINY and settles and stops:
             self.value, self.rate = wanted, exact
             return wanted
         gap = (exact - target_rate) * dt
         closing = closing_rate(abs(gap), self.down if gap > 0.0 else self.up, dt)
-        self.rate = min(max(target_rate + math.copysign(closing, gap), low), high)
+        rate = min(max(target_rate + math.copysign(closing, gap), least), most)
+        self.rate = min(max(rate, low), high)
         self.value += self.rate * dt
         return self.value
+
+    def _stopping_rates(self, final: float | None, dt: float) -> tuple[float, float]:
+        """Return the bounds on the rate within which the value can stop at `final`."""
+        if final is None:
+            return -math.inf, math.inf
+        rest = final - self.value
+        if rest > 0.0:
+            return -math.inf, closing_rate(rest, self.down, dt)
+        return -closing_rate(-rest, self.up, dt), math.inf
 
 
 def closing_rate(gap: float, bound: float, dt: float) -> float:

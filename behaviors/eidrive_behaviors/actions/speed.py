@@ -112,7 +112,7 @@ class SpeedAction(ActionBehaviour):
         if self._relative is not None and transition.extent > 0.0:
             speed = self._approach(speed)
         if self._limiter is not None and self.context.dt > 0.0:
-            speed = self._limiter.advance(speed, self.context.dt)
+            speed = self._limiter.advance(speed, self.context.dt, transition.target)
         self.actor.motion.set_speed(speed, self._sense)
         reached = transition.done and abs(speed - transition.target) < EPSILON
         return Status.SUCCESS if reached and not self._continuous else Status.RUNNING
