@@ -207,6 +207,25 @@ def test_lane_offset_is_kept_within_the_lateral_acceleration(scene: RunScene) ->
     assert max(abs(last - first) / 0.1 for first, last in pairwise(rates)) < 1.0 + 1e-6
 
 
+@pytest.mark.element("LaneOffsetAction")
+@pytest.mark.parametrize(("shape", "time"), [("sinusoidal", 2.0), ("linear", 2.0), ("cubic", 6.0)])
+@pytest.mark.parametrize("dt", [0.02, 0.1])
+def test_lane_offset_relative_does_not_pass_its_reference(scene: RunScene, shape: str, time: float, dt: float) -> None:
+    """Other moves 4 m aside, at up to 2 · (π / 2)² = 4.9 m/s² or at once: Ego is late by its limit of 3 m/s².
+
+    A cubic in 6 s needs 6 · 4 / 6² = 0.67 m/s²: Ego has the offset of Other in the step before.
+    """
+    follow = offset('<RelativeTargetLaneOffset entityRef="Other" value="0"/>', "true", 'maxLateralAcc="3"')
+    other = change(lane(-2), shape, "time", time)
+    played = scene(9, ("Ego", follow), ("Other", other, after(0.5)), dt=dt)
+    y = [row["Ego"].y for row in played.rows]
+    rates = [(last - first) / dt for first, last in pairwise(y)]
+    assert max(abs(last - first) / dt for first, last in pairwise(rates)) < 3.0 + 1e-6
+    assert min(y) == y[-1] == pytest.approx(-6.0)
+    if shape == "cubic":
+        assert y[1:] == pytest.approx([row["Other"].y for row in played.rows[:-1]], abs=1e-6)
+
+
 @pytest.mark.element("LateralDistanceAction")
 def test_lateral_distance_is_reached_at_the_maximum_speed(scene: RunScene) -> None:
     action = """<PrivateAction><LateralAction><LateralDistanceAction entityRef="Other" distance="3" freespace="false"

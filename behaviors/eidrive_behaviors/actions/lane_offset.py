@@ -92,7 +92,8 @@ class LaneOffsetAction(ActionBehaviour):
         """Set the offset at the end of a step after the transition."""
         limited.highest = STEEPEST * abs(self.actor.motion.speed)
         limited.lowest = -limited.highest
-        self._offset = limited.advance(self._target(here) * self._way(here), self.context.dt)
+        target = self._target(here) * self._way(here)
+        self._offset = limited.advance(target, self.context.dt, final=target)
         self.actor.motion.set_lateral_step(LateralStep(self._offset, shortens_distance=False, rate=limited.rate))
 
     def _shape(self) -> model.DynamicsShape:
