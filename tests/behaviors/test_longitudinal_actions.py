@@ -333,6 +333,28 @@ def test_speed_profile_with_overlapping_corners_keeps_acceleration_and_rate(scen
     assert played.when("action 0", "completeState") == pytest.approx(1.9)
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_speed_profile_with_overlapping_corners_does_not_pass_its_turns(scene: RunScene, sign: float) -> None:
+    """It turns at 21 m/s after 1.2 s, and ends at 5 m/s: 16 m/s at 2 m/s³ take 2 √(16 / 2) s = 5.7 s.
+
+    At the turn an acceleration of up to 1 m/s², which falls to 0 within 0.5 s, remains.
+    """
+    entries = [(1.0, sign * 20.5), (0.2, sign * 21.0), (3.0, sign * 5.0)]
+    action = profile(
+        "follow",
+        *entries,
+        limits='maxAcceleration="9" maxDeceleration="9"',
+        rates='maxAccelerationRate="2" maxDecelerationRate="2"',
+    )
+    played = scene(9, ("Ego", action), ego=(-1, 300.0, sign * 20.0))
+    speeds = [row["Ego"].speed * sign for row in played.rows]
+    accelerations = [0.0, *((after - before) / 0.1 for before, after in pairwise(speeds))]
+    assert max(abs(after - before) for before, after in pairwise(accelerations)) <= 0.2 + 1e-9
+    assert max(speeds) <= 21.0 + 1e-9
+    assert min(speeds) == speeds[-1] == pytest.approx(5.0)
+    assert played.when("action 0", "completeState") == pytest.approx(1.2 + 2.0 * math.sqrt(8.0), abs=0.5)
+
+
 def test_speed_profile_in_follow_mode_keeps_its_last_speed_until_its_time(scene: RunScene) -> None:
     """Two entries of equal slope, 1 m/s², then the same speed for 3 s."""
     action = profile("follow", (2.0, 22.0), (2.0, 24.0), (3.0, 24.0), rates=RATES)

@@ -13,7 +13,7 @@ import math
 from bisect import bisect_right
 
 from eidrive_scenario.api.actions import ActionBehaviour, EntityAbsentError, TrajectoryCurve, model, turning_wheelbase
-from eidrive_scenario.api.common import Pose, wrap_angle
+from eidrive_scenario.api.common import EPSILON, Pose, wrap_angle
 
 
 def warn_without_effect(behaviour: ActionBehaviour) -> None:
@@ -114,6 +114,10 @@ class RateLimitedValue:
         if rest > 0.0:
             return -math.inf, closing_rate(rest, self.down, dt)
         return -closing_rate(-rest, self.up, dt), math.inf
+
+    def rests_at(self, final: float, dt: float) -> bool:
+        """True if the value is at `final` and its rate can be 0 in the next step."""
+        return abs(self.value - final) < EPSILON and -self.up * dt - TINY <= self.rate <= self.down * dt + TINY
 
 
 def closing_rate(gap: float, bound: float, dt: float) -> float:

@@ -111,11 +111,12 @@ class SpeedAction(ActionBehaviour):
         speed = transition.advance(self.context.dt)
         if self._relative is not None and transition.extent > 0.0:
             speed = self._approach(speed)
+        reached = abs(speed - transition.target) < EPSILON
         if self._limiter is not None and self.context.dt > 0.0:
             speed = self._limiter.advance(speed, self.context.dt, transition.target)
+            reached = self._limiter.rests_at(transition.target, self.context.dt)
         self.actor.motion.set_speed(speed, self._sense)
-        reached = transition.done and abs(speed - transition.target) < EPSILON
-        return Status.SUCCESS if reached and not self._continuous else Status.RUNNING
+        return Status.SUCCESS if transition.done and reached and not self._continuous else Status.RUNNING
 
     def _retarget(self, target: float) -> None:
         """Change the target. A rate keeps its slope and changes its duration; a time or distance keeps its duration."""

@@ -113,15 +113,20 @@ class SpeedProfileAction(ActionBehaviour):
         done = segment is last
         speed, slope = (last.speed, 0.0) if done else (segment.at(self._elapsed), segment.slope_at(self._elapsed))
         if self._limiter is not None and dt > 0.0:
-            speed = self._limiter.advance(speed, dt)
+            speed = self._limiter.advance(speed, dt, self._next_turn(index))
             slope = self._limiter.rate
-            done = done and abs(speed - last.speed) < EPSILON
+            done = done and self._limiter.rests_at(last.speed, dt)
         if self.actor.driven:
             warn_of_reverse(self, speed)
             self.actor.set_goal(replace(self.actor.goal or Goal(), speed=speed, acceleration=0.0 if done else slope))
         else:
             self.actor.motion.set_speed(speed, self._sense)
         return Status.SUCCESS if done else Status.RUNNING
+
+    def _next_turn(self, index: int) -> float:
+        """Return the next speed from a segment on at which the profile stops or turns [m/s]."""
+        slope = self._segments[index].slope
+        return next(piece.speed for piece in self._segments[index:] if piece.slope * slope <= 0.0)
 
     def _corners(self, start: float) -> list[tuple[float, float]]:
         """Return times [s] and speeds [m/s] of the corners of the profile, the current one first."""
