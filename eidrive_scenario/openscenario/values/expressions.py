@@ -39,7 +39,9 @@ class ExpressionError(Exception):
 
 
 def _round(value: float) -> int:
-    return int(math.copysign(math.floor(abs(value) + 0.5), value))
+    whole = math.floor(abs(value))
+    # A sum with 0.5 would be rounded itself
+    return int(math.copysign(whole + (abs(value) - whole >= 0.5), value))
 
 
 def _sign(value: float) -> int:

@@ -27,6 +27,8 @@ from eidrive_scenario.openscenario.values.expressions import (
         ("5.5 % 2", 1.5),
         ("round(2.5)", 3),
         ("round(-2.5)", -3),
+        ("round(0.49999999999999994)", 0),
+        ("round(4503599627370497.0)", 4503599627370497),
         ("floor(-1.5)", -2),
         ("ceil(1.2)", 2),
         ("sqrt(16)", 4),
