@@ -37,11 +37,15 @@ def test_brake_override_decelerates_by_its_share_and_is_released(run: Run, value
     assert slope(speed, 2.7, 4.5) > 1.0
 
 
-def test_brake_force_and_parking_brake_overrides_decelerate(run: Run) -> None:
-    """CAR specifies no mass: 1500 kg. 3000 N are 2 m/s²; 0.3 of the parking brake is 3 m/s²."""
-    force = '<Throttle active="true" value="0"/><Brake active="true"><BrakeForce value="3000"/></Brake>'
+@pytest.mark.parametrize("throttle", ['<Throttle active="true" value="0"/>', ""])
+def test_brake_force_and_parking_brake_overrides_decelerate(run: Run, throttle: str) -> None:
+    """CAR specifies no mass: 1500 kg. 3000 N are 2 m/s²; 0.3 of the parking brake is 3 m/s².
+
+    The driver, which would keep its speed, releases the throttle.
+    """
+    force = f'{throttle}<Brake active="true"><BrakeForce value="3000"/></Brake>'
     assert -2.5 < slope(run(2, ("Ego", hold(force))).of("Ego", "speed"), 0.5, 1.9) < -2.0
-    parking = '<Throttle active="true" value="0"/><ParkingBrake active="true"><BrakePercent value="30"/></ParkingBrake>'
+    parking = f'{throttle}<ParkingBrake active="true"><BrakePercent value="30"/></ParkingBrake>'
     assert -3.5 < slope(run(2, ("Ego", hold(parking))).of("Ego", "speed"), 0.5, 1.9) < -3.0
 
 

@@ -57,6 +57,8 @@ class ControlOverrides:
         for control, override in held.items():
             if control in now:
                 now[control] = self._moved(override)
+        if "throttle" not in held and any(now[brake] > 0.0 for brake in ("brake", "parkingBrake") if brake in held):
+            now["throttle"] = 0.0  # A driver that keeps its speed would compensate the brake
         self._before = now
         gear = held.get("gear")
         idle = gear is not None and gear.value == 0.0
