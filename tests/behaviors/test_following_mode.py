@@ -14,6 +14,7 @@ from eidrive_behaviors.actions.following import PathPursuit, RateLimitedValue, s
 from recorded_scene import RunScene
 from storyboard_xml import private_xml
 from trajectories import follow_points
+from whole_run import Run
 
 from eidrive_scenario.api.actions import TrajectoryCurve, model
 from eidrive_scenario.api.common import Placement, Pose
@@ -63,6 +64,31 @@ def test_speed_change_limited_by_its_jerk_does_not_overshoot(
     assert max(abs(after - before) for before, after in pairwise(accelerations)) <= dt + 1e-6
     assert speeds[-1] == pytest.approx(target)
     assert played.when("action 0", "completeState") == pytest.approx(2.0 * math.sqrt(15.0), abs=0.1)
+
+
+@pytest.mark.element("SpeedAction")
+@pytest.mark.parametrize(
+    ("action", "rate", "warning"),
+    [
+        # 5 m/s at 1 m/s³ take at least 2 √5 s = 4.5 s
+        (
+            speed(25, "cubic", 4, "follow"),
+            1,
+            "takes longer than 4.00 s: the rates of the acceleration are limited to 1",
+        ),
+        # a cubic needs 6 · 5 / 6² m/s³ = 0.83 m/s³ in 6 s
+        (speed(25, "cubic", 6, "follow"), 1, None),
+        (speed(25, "cubic", 4, "position"), 1, None),
+        (speed(25, "step", 0, "follow"), 1, None),
+        (speed(40, "linear", 1, "follow"), 5, "takes at least 2.00 s instead of 1.00 s: maxAcceleration is 10 m/s²"),
+    ],
+)
+def test_speed_change_delayed_by_its_jerk_warns_once(run: Run, action: str, rate: int, warning: str | None) -> None:
+    limits = f'maxAccelerationRate="{rate}" maxDecelerationRate="{rate}"'
+    played = run(8.0, ("Ego", action), driven=False, performance=limits)
+    texts = [text for text in map(str, played.result.warnings) if "SpeedAction" in text]
+    assert len(texts) == (warning is not None)
+    assert warning is None or warning in texts[0]
 
 
 def test_limited_speed_respects_the_jerk_of_the_performance() -> None:

@@ -78,6 +78,11 @@ class RateLimitedValue:
         self.lowest, self.highest = lowest, highest
         self._target = value
 
+    @property
+    def has_finite_bounds(self) -> bool:
+        """Whether the change of the rate is limited."""
+        return math.isfinite(min(self.up, self.down))
+
     def keep(self, value: float, dt: float) -> None:
         """Set value and target of the time dt later, regardless of the bounds."""
         self.rate = (value - self.value) / dt

@@ -71,10 +71,10 @@ class SpeedAction(ActionBehaviour):
         self._sense = self.actor.motion.sense if self._relative is None else None
         target = self._target()
         self._transition = self._build_transition(start, target)
-        self._warn_of_limits(start, target)
         vehicle = self.actor.entity
         if is_follow_mode(self._dynamics) and isinstance(vehicle, model.Vehicle):
             self._limiter = speed_limiter(vehicle, start, backwards=start + target < 0.0)
+        self._warn_of_limits(start, target)
 
     def _build_transition(self, start: float, target: float) -> TransitionProfile:
         transition = self._requested_transition(start, target)
@@ -95,7 +95,8 @@ class SpeedAction(ActionBehaviour):
         extent, requested = self._transition.extent, self._requested_transition(start, target).extent
         top, faster, slower = self.actor.limits()
         if extent > requested + EPSILON:
-            late = f"takes {extent:.2f} s instead of {requested:.2f} s"
+            least = "" if self._limiter is None or not self._limiter.has_finite_bounds else "at least "
+            late = f"takes {least}{extent:.2f} s instead of {requested:.2f} s"
             self._delay_warning.add(late, describe_slope_limit(start, target, faster, slower))
         if self._absolute is not None and abs(self._absolute.value) > top:
             message = f"the target speed is reduced to {top:g} m/s (got {self._absolute.value:g} m/s)"
@@ -108,13 +109,19 @@ class SpeedAction(ActionBehaviour):
             self._retarget(self._target())
         if self.actor.driven:
             return self._set_driver_goal()
+        ends = not transition.done
         speed = transition.advance(self.context.dt)
+        ends &= transition.done
         if self._relative is not None and transition.extent > 0.0:
             speed = self._approach(speed)
         reached = abs(speed - transition.target) < EPSILON
         if self._limiter is not None and self.context.dt > 0.0:
             speed = self._limiter.advance(speed, self.context.dt, transition.target)
             reached = self._limiter.rests_at(transition.target, self.context.dt)
+            if ends and not reached and self._limiter.has_finite_bounds:
+                limit = f"limited to {self._limiter.up:g} and {self._limiter.down:g} m/s³"
+                late = f"takes longer than {transition.extent:.2f} s"
+                self._delay_warning.add(late, f"the rates of the acceleration are {limit}")
         self.actor.motion.set_speed(speed, self._sense)
         return Status.SUCCESS if transition.done and reached and not self._continuous else Status.RUNNING
 

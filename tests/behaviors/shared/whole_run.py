@@ -76,9 +76,11 @@ class Run:
         init: str = "",
         edge: str = "none",
         delay: float = 0.0,
+        performance: str = "",
     ) -> RecordedRun:
         (self.folder / "street.xodr").write_text(street)
         places = {"Ego": ego, **(others or {})}
+        controllers = {name: AGENT if driven and name == "Ego" else "" for name in places}
         groups = groups_of(steps or [("Ego", NOTHING)], edge=edge, delay=delay, selecting=bool(start))
         begins = trigger_xml(condition_xml(start, edge, delay)) if start else ""
         path = self.folder / "scene.xosc"
@@ -86,7 +88,7 @@ class Run:
             scenario_xml(
                 declarations=MONITOR,
                 road=road_file_xml("street.xodr") + signals,
-                entities="".join(round_car_xml(n, AGENT if driven and n == "Ego" else "") for n in places) + more,
+                entities="".join(round_car_xml(*car, limits=performance) for car in controllers.items()) + more,
                 init=globally + "".join(init_xml(name, at(*place)) for name, place in places.items()) + init,
                 story=acts_xml(act_xml(groups, begins)),
                 stop=end_xml(end),
