@@ -40,12 +40,15 @@ _AT_ONCE = 16_384
 
 
 class Subjects(NamedTuple):
-    """Subjects of an image: ground, scenery that casts shadows, actors, and hidden actors that cast shadows."""
+    """Subjects of an image: ground, scenery that casts shadows, actors, hidden actors that cast shadows, and decks of
+    bridges, which only cast shadows.
+    """
 
     ground: Sequence[MeshInstance]
     standing: Sequence[MeshInstance]
     actors: Sequence[MeshInstance]
     unseen: Sequence[MeshInstance] = ()
+    decks: Sequence[MeshInstance] = ()
 
     @property
     def scenery(self) -> Sequence[MeshInstance]:
@@ -165,7 +168,7 @@ def _forget_first(memory: dict[object, Any], most: int) -> None:
 def _whole(subjects: Subjects, beams: Sequence[Beam], at: Circumstances, ground: float) -> _Canvas:
     """Return a completely drawn image."""
     cover, lit = _staged([*subjects.scenery, *subjects.actors], at)
-    casters = [*subjects.standing, *subjects.actors, *subjects.unseen]
+    casters = [*subjects.standing, *subjects.decks, *subjects.actors, *subjects.unseen]
     shadows = Shadows.of(at.grid, at.grid.drawn(casters) if at.grid is not None else None)
     open_sky = dimmed(_dimming(subjects), cover, lit.upright, at.view)
     canvas = _Canvas.blank(cover.triangle.size)
@@ -232,7 +235,7 @@ def _scenery(subjects: Subjects, at: Circumstances) -> _Kept:
     """Return the image without actors, and the data that is needed to draw them."""
     cover, lit = _staged(subjects.scenery, at)
     canvas = _Canvas.blank(cover.triangle.size)
-    heights = at.grid.drawn(subjects.standing) if at.grid is not None else None
+    heights = at.grid.drawn([*subjects.standing, *subjects.decks]) if at.grid is not None else None
     open_sky = np.ones(at.view.shape, dtype=np.float32)
     _draw(canvas, _Visible(cover, lit, Shadows.of(at.grid, heights), open_sky), (), at, 0.0)
     return _Kept(cover, lit, canvas, heights)

@@ -119,6 +119,9 @@ BESIDE_ROADS = 1500.0
 """Extent of the ground around the roads [m]."""
 BELOW_ROADS = 0.06
 """Distance of the ground below the roads, which prevents that it is visible through them [m]."""
+DECK = 1.0
+"""Thickness of the decks that cast shadows [m]: more than a pixel of a shadow map, so that they do not shade their
+roads."""
 _LIT_WINDOWS = 0.3
 """Share of the windows of a building that are lit at night."""
 WINDOW_LIGHT: Light = (26.0, 19.0, 10.0)
@@ -149,6 +152,8 @@ class Visuals:
         self._roadside = Roadside(scenery.road_objects, heads)
         self._shown_buildings = 0
         self._ground = self._ground_parts()
+        decks = [] if scenery.level else self._ground
+        self._decks = [replace(each, position=each.position - (0.0, 0.0, DECK)) for each in decks]
         self._renderer = Renderer()
         self._buildings: Model | None = None
 
@@ -180,7 +185,7 @@ class Visuals:
         if self._buildings is not None:
             glowing = {"window_lit": WINDOW_LIGHT} if weather.lamps_on and weather.sun_elevation < 3.0 else {}
             standing.insert(0, MeshInstance(self._buildings, np.eye(3), np.zeros(3), -1, glowing))
-        subjects = Subjects(self._ground, standing, actors, ignored)
+        subjects = Subjects(self._ground, standing, actors, ignored, self._decks)
         content = ImageContent(subjects, beams, weather, pose, pinhole, self._height_below(*pose[:3, 3].tolist()))
         return SceneImage(self._renderer, content)
 
@@ -191,12 +196,17 @@ class Visuals:
         return 0.0 if roads is None or near is None else roads.pose(near).z
 
     def _ground_parts(self) -> list[MeshInstance]:
-        """Return roads, markings and surrounding land, split by a grid."""
+        """Return roads with markings, and their undersides unless they are level, and surrounding land; split by a
+        grid.
+        """
         low, high = np.zeros(3), np.zeros(3)
         parts: list[Model] = []
         if self._scenery.roads is not None:
             meshes = surface_meshes(self._scenery.roads)
             parts = [model({mesh.kind: mesh.vertices[mesh.faces]}, {mesh.kind: mesh.color}) for mesh in meshes]
+            if not self._scenery.level:
+                surfaces = [mesh for mesh in meshes if not mesh.kind.startswith("marking")]
+                parts += [model({"concrete": mesh.vertices[mesh.faces[:, ::-1]]}, {}) for mesh in surfaces]
             points = np.concatenate([mesh.vertices for mesh in meshes]) if meshes else np.zeros((1, 3))
             low, high = points.min(axis=0), points.max(axis=0)
         (x0, y0, z), (x1, y1, _) = (low - BESIDE_ROADS).tolist(), (high + BESIDE_ROADS).tolist()

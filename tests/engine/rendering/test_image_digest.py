@@ -249,9 +249,8 @@ def small_model() -> Model:
 def small_content() -> ImageContent:
     instance = MeshInstance(small_model(), np.eye(3), np.zeros(3), 1, {"paint": (1.0, 2.0, 3.0)})
     beam = Beam(np.zeros(3), np.eye(3), 0.5, False)
-    return ImageContent(
-        Subjects([instance], [instance], [instance], [instance]), [beam], Weather(), np.eye(4), Street.pinhole, 0.5
-    )
+    subjects = Subjects([instance], [instance], [instance], [instance], [instance])
+    return ImageContent(subjects, [beam], Weather(), np.eye(4), Street.pinhole, 0.5)
 
 
 def variants(value: Any) -> list[Any]:

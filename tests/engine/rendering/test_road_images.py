@@ -1,0 +1,75 @@
+"""Tests of images of roads: decks of bridges."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from opendrive_xml import elevation_xml, lanes_xml, map_xml, road_xml
+
+from eidrive_scenario.rendering import picture_maker
+from eidrive_scenario.rendering.tone_mapping import LUMA
+from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.world import World
+from eidrive_scenario.world.camera import Pinhole
+from eidrive_scenario.world.weather import Weather
+
+PINHOLE = Pinhole.of_fov(160, 120, math.radians(80))
+LANES = lanes_xml(1, 1, 3.5)
+
+
+def looking(x: float, y: float, z: float, pitch: float = 0.0) -> np.ndarray:
+    """Return the pose of a camera that looks along x, directed downwards by `pitch`."""
+    pose = np.eye(4)
+    pose[:3, 0], pose[:3, 1] = (0.0, -1.0, 0.0), (-math.sin(pitch), 0.0, -math.cos(pitch))
+    pose[:3, 2], pose[:3, 3] = (math.cos(pitch), 0.0, -math.sin(pitch)), (x, y, z)
+    return pose
+
+
+def rays(pose: np.ndarray) -> np.ndarray:
+    """Return the rays (H, W, 3) through the pixels at depth 1 in world axes."""
+    lines, columns = np.mgrid[: PINHOLE.height, : PINHOLE.width] + 0.5
+    x, y = (columns - PINHOLE.center_x) / PINHOLE.focal, (lines - PINHOLE.center_y) / PINHOLE.focal
+    directions: np.ndarray = np.stack([x, y, np.ones_like(x)], axis=-1) @ pose[:3, :3].T
+    return directions
+
+
+@pytest.fixture
+def bridge() -> Iterator[World]:
+    """Road along x and another one across it, 5 m above and 7 m wide, between x = 46.5 m and 53.5 m."""
+    over = road_xml("2", length=200.0, x=50.0, y=-100.0, hdg=math.pi / 2, lanes=LANES, profiles=elevation_xml(5.0))
+    with World(
+        RoadNetwork.parse(map_xml(road_xml(length=200.0, lanes=LANES), over)), picture_maker=picture_maker
+    ) as world:
+        yield world
+
+
+def test_deck_of_bridge_is_visible_from_below(bridge: World) -> None:
+    """A ray of depth 1 from a height of 1.5 m that rises by z meets the deck at the depth 3.5 / z."""
+    pose = looking(35.0, -1.75, 1.5, pitch=-0.3)
+    directions = rays(pose)
+    with np.errstate(divide="ignore"):
+        depth = 3.5 / directions[..., 2]
+    x = 35.0 + directions[..., 0] * depth
+    meets = (depth > 0.0) & (np.abs(x - 50.0) < 3.4)
+    assert meets.sum() > 1000
+    np.testing.assert_allclose(bridge.radiance(pose, PINHOLE).depth[meets], depth[meets], rtol=1e-4)
+
+
+@pytest.mark.parametrize("images", [1, 3], ids=["first", "cached"])
+def test_deck_of_bridge_shades_road_below_and_not_itself(bridge: World, images: int) -> None:
+    """The sun in the west at 45 degrees shifts the shadow by the height of the deck, to x = 51.5 m to 57.5 m."""
+    bridge.set_weather(Weather(sun_azimuth=270.0, sun_elevation=45.0, cloud_cover=0.0))
+
+    def brightness(x: float, z: float) -> float:
+        for _ in range(images):
+            light = bridge.radiance(looking(x, -1.75, z, math.pi / 2), PINHOLE).luminance[50:70, 70:90]
+        return float((light @ LUMA.astype(np.float32)).mean())
+
+    lit = brightness(40.0, 3.0)
+    assert brightness(50.0, 3.0) > 0.8 * lit
+    assert brightness(54.5, 3.0) < 0.3 * lit
+    assert brightness(60.0, 3.0) > 0.8 * lit
+    assert brightness(50.0, 8.0) > 0.8 * lit
