@@ -23,7 +23,7 @@ from eidrive_scenario.rendering.meshes.signs import sign, sign_face
 from eidrive_scenario.rendering.meshes.solids import polygon
 from eidrive_scenario.rendering.model import Light, MeshInstance, Model, gridded, merged, model, placed
 from eidrive_scenario.rendering.renderer import ImageContent, Renderer, Subjects
-from eidrive_scenario.roads import surface_meshes
+from eidrive_scenario.roads import RoadNetwork, surface_meshes
 from eidrive_scenario.roads.model.signal_states import GREEN, RED, YELLOW, lamp_colors, lamps, lit
 from eidrive_scenario.world.actor import ActorSpec, ExtraAxle, Vector3
 from eidrive_scenario.world.appearance import Appearance
@@ -44,10 +44,11 @@ UNLIT = {RED: (0.20, 0.03, 0.03), YELLOW: (0.20, 0.15, 0.03), GREEN: (0.03, 0.16
 
 
 class Roadside:
-    """Meshes of the road objects and signals of one road network."""
+    """Meshes of the road objects and signals of one road network, around `origin` (3,) in the world."""
 
-    def __init__(self, pieces: Sequence[RoadObjectBody], heads: Sequence[SignalHead]) -> None:
-        self._still: Model | None = _standing(pieces)
+    def __init__(self, pieces: Sequence[RoadObjectBody], heads: Sequence[SignalHead], origin: Array) -> None:
+        self._origin = origin
+        self._still: Model | None = _standing(pieces, origin)
         self._heads = tuple(heads)
         self._positions = np.array([head.pose[:3] for head in heads]).reshape(-1, 3)
         self._unlit = [
@@ -59,7 +60,7 @@ class Roadside:
 
     def instances(self, viewpoint: Array, states: Mapping[str, str], time: float) -> list[MeshInstance]:
         """Return all objects within sight of a camera at `viewpoint` (3,), with the signal states at `time` [s]."""
-        instances = [] if self._still is None else [MeshInstance(self._still, np.eye(3), np.zeros(3))]
+        instances = [] if self._still is None else [MeshInstance(self._still, np.eye(3), self._origin)]
         near = np.flatnonzero(np.linalg.norm(self._positions - viewpoint, axis=1) < IN_SIGHT)
         for number in near.tolist():
             glow = _glow(self._heads[number], states.get(self._heads[number].signal.id), time)
@@ -67,12 +68,12 @@ class Roadside:
         return instances
 
 
-def _standing(pieces: Iterable[RoadObjectBody]) -> Model | None:
-    """Return all road objects as one model; equal objects are placed together."""
+def _standing(pieces: Iterable[RoadObjectBody], origin: Array) -> Model | None:
+    """Return all road objects as one model relative to `origin`; equal objects are placed together."""
     triangles: dict[str, list[Array]] = {}
     for mesh, poses in equal_road_objects(pieces):
         for material, part in mesh.items():
-            triangles.setdefault(material, []).append(_placed(part, poses))
+            triangles.setdefault(material, []).append(_placed(part, poses) - origin)
     if not triangles:
         return None
     return gridded(model({material: np.concatenate(parts) for material, parts in triangles.items()}, {}))
@@ -148,8 +149,9 @@ class Visuals:
 
     def __init__(self, scenery: Scenery) -> None:
         self._scenery = scenery
+        self._origin = _origin(scenery.roads)
         heads = signal_heads(scenery.roads) if scenery.roads is not None else ()
-        self._roadside = Roadside(scenery.road_objects, heads)
+        self._roadside = Roadside(scenery.road_objects, heads, self._origin)
         self._shown_buildings = 0
         self._ground = self._ground_parts()
         decks = [] if scenery.level else self._ground
@@ -161,7 +163,7 @@ class Visuals:
         """Return the image of a camera. Actors that the scenario makes invisible cast no shadows and emit no light."""
         if self._shown_buildings < len(self._scenery.buildings):
             self._shown_buildings = len(self._scenery.buildings)
-            self._buildings = gridded(merged(building_model(each) for each in self._scenery.buildings))
+            self._buildings = gridded(merged(building_model(each, self._origin) for each in self._scenery.buildings))
         weather, time = state.weather, state.time
         actors: list[MeshInstance] = []
         ignored: list[MeshInstance] = []
@@ -184,7 +186,7 @@ class Visuals:
         standing = self._roadside.instances(pose[:3, 3], state.signals, time)
         if self._buildings is not None:
             glowing = {"window_lit": WINDOW_LIGHT} if weather.lamps_on and weather.sun_elevation < 3.0 else {}
-            standing.insert(0, MeshInstance(self._buildings, np.eye(3), np.zeros(3), -1, glowing))
+            standing.insert(0, MeshInstance(self._buildings, np.eye(3), self._origin, -1, glowing))
         subjects = Subjects(self._ground, standing, actors, ignored, self._decks)
         content = ImageContent(subjects, beams, weather, pose, pinhole, self._height_below(*pose[:3, 3].tolist()))
         return SceneImage(self._renderer, content)
@@ -202,7 +204,9 @@ class Visuals:
         low, high = np.zeros(3), np.zeros(3)
         parts: list[Model] = []
         if self._scenery.roads is not None:
-            meshes = surface_meshes(self._scenery.roads)
+            meshes = [
+                replace(mesh, vertices=mesh.vertices - self._origin) for mesh in surface_meshes(self._scenery.roads)
+            ]
             parts = [model({mesh.kind: mesh.vertices[mesh.faces]}, {mesh.kind: mesh.color}) for mesh in meshes]
             if not self._scenery.level:
                 surfaces = [mesh for mesh in meshes if not mesh.kind.startswith("marking")]
@@ -214,7 +218,16 @@ class Visuals:
         kind = "grass" if self._scenery.roads is not None else "asphalt"
         land = model({kind: polygon([(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)])}, {})
         pieces = [land, gridded(merged(parts))] if parts else [land]
-        return [MeshInstance(piece, np.eye(3), np.zeros(3)) for piece in pieces]
+        return [MeshInstance(piece, np.eye(3), self._origin) for piece in pieces]
+
+
+def _origin(roads: RoadNetwork | None) -> Array:
+    """Return the origin (3,) of the models of scenery: the middle of the roads in plan view, in whole kilometers.
+
+    Single precision resolves 0.06 mm at 1 km, but 0.5 m at the coordinates of UTM.
+    """
+    low_x, low_y, high_x, high_y = (0.0, 0.0, 0.0, 0.0) if roads is None else roads.bounds()
+    return np.array([round((low_x + high_x) / 2.0, -3), round((low_y + high_y) / 2.0, -3), 0.0])
 
 
 def _actor_model(spec: ActorSpec, motion: str) -> Model:
@@ -245,8 +258,8 @@ def _stance(spec: ActorSpec, at: ActorState) -> tuple[Array, Array]:
     return rotation, foot
 
 
-def building_model(building: Building) -> Model:
-    """Return a building; its name determines the lit windows."""
+def building_model(building: Building, origin: Array) -> Model:
+    """Return a building relative to `origin` (3,); its name determines the lit windows."""
     own = building.color or by_name(building.name, FACADES)
     mesh = dict(building_mesh(building.size))
     windows = mesh.pop("window", None)
@@ -258,4 +271,4 @@ def building_model(building: Building) -> Model:
     colors = {"wall": own, "window_lit": MATERIALS["window"]}
     foot = np.array([*building.center[:2], building.center[2] - building.size[2] / 2])
     turn = rotation_matrix(building.yaw, 0.0, 0.0)
-    return placed(model(mesh, colors), turn, foot)
+    return placed(model(mesh, colors), turn, foot - origin)

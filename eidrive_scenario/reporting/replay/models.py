@@ -97,7 +97,7 @@ def street_models(network: RoadNetwork | None) -> Data:
     meshes = surface_meshes(network)
     surfaces = [model({mesh.kind: mesh.vertices[mesh.faces]}, {mesh.kind: mesh.color}) for mesh in meshes]
     points = np.concatenate([mesh.vertices for mesh in meshes]) if meshes else np.zeros((1, 3))
-    houses = [building_model(each) for each in buildings(network)]
+    houses = [building_model(each, np.zeros(3)) for each in buildings(network)]
     return {
         "surfaces": encoded_model(merged(surfaces)) if surfaces else None,
         "houses": encoded_model(merged(houses)) if houses else None,

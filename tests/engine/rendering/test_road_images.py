@@ -1,4 +1,4 @@
-"""Tests of images of roads: decks of bridges."""
+"""Tests of images of roads: decks of bridges, and distant coordinates."""
 
 from __future__ import annotations
 
@@ -73,3 +73,21 @@ def test_deck_of_bridge_shades_road_below_and_not_itself(bridge: World, images: 
     assert brightness(54.5, 3.0) < 0.3 * lit
     assert brightness(60.0, 3.0) > 0.8 * lit
     assert brightness(50.0, 8.0) > 0.8 * lit
+
+
+@pytest.mark.parametrize(("x", "y"), [(696_320.0, 5_332_992.0), (-8192.0, 4096.0)], ids=["utm", "kilometers"])
+def test_street_looks_the_same_at_any_coordinates(x: float, y: float) -> None:
+    """The coordinates are multiples of 4096 m, with which the texture of the ground repeats."""
+    mark = '<roadMark sOffset="0" type="solid" width="0.12" color="white"/>'
+    objects = """<objects>
+      <object id="b" type="building" name="b" s="50" t="14" zOffset="0" height="8" length="10" width="10"/>
+      <object id="p" type="pole" name="p" s="25" t="6" zOffset="0" height="5" radius="0.15"/></objects>"""
+    images = []
+    for at in ((0.0, 0.0), (x, y)):
+        road = road_xml(length=200.0, x=at[0], y=at[1], lanes=lanes_xml(1, 1, 3.5, more=mark), extra=objects)
+        with World(RoadNetwork.parse(map_xml(road)), picture_maker=picture_maker) as world:
+            images.append(world.radiance(looking(at[0] + 10.0, at[1] - 1.75, 1.4), PINHOLE))
+    first, other = images
+    np.testing.assert_array_equal(np.isfinite(other.depth), np.isfinite(first.depth))
+    np.testing.assert_allclose(other.depth, first.depth, rtol=1e-4)
+    np.testing.assert_allclose(other.luminance, first.luminance, rtol=0.02)
