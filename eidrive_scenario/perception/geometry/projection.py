@@ -87,14 +87,17 @@ def level_frame(camera: CameraReading) -> tuple[LevelFrame, Array]:
 POINTS: Array = 0.8 * BOX_SAMPLES
 """Sampled points (10, 3) of a box, in half lengths from its center."""
 LEAST_HEIGHT, LEGIBLE_HEIGHT = 8.0, 20.0
-"""Objects below the first height in the image are not expected to be detected; from the second on they are [px]. A
-third of the vehicles that the networks miss is below 15 px (docs/perception.md)."""
+"""Objects below the first height in the input of a network are not expected to be detected; from the second on they are
+[px]. A third of the vehicles that the networks miss is below 15 px (docs/perception.md)."""
 SAME = 0.5
 """A detection does not occlude a box whose center is closer than this share of both lengths: it is the same object."""
 
 
-def in_camera(boxes: Array, camera: CameraReading, others: Array) -> Array:
-    """Return the share (N,) in [0, 1] of boxes (N, 7) that the camera can show past the boxes `others` (M, 7)."""
+def in_camera(boxes: Array, camera: CameraReading, others: Array, reduction: float = 1.0) -> Array:
+    """Return the share (N,) in [0, 1] of boxes (N, 7) that the camera can show past the boxes `others` (M, 7).
+
+    `reduction` is the height of the image in the input of a network, divided by its own height.
+    """
     if not len(boxes):
         return np.empty(0)
     points = points_of_boxes(boxes, POINTS)
@@ -104,7 +107,7 @@ def in_camera(boxes: Array, camera: CameraReading, others: Array) -> Array:
     x, y = positions[..., 0], positions[..., 1]
     visible = (x >= 0.0) & (x < width) & (y >= 0.0) & (y < height)
     corners, _ = pixels(box_corners(boxes).reshape(-1, 3), camera)
-    rows = corners.reshape(len(boxes), -1, 2)[..., 1]
+    rows = reduction * corners.reshape(len(boxes), -1, 2)[..., 1]
     tall = np.where(np.isnan(rows).any(axis=1), LEGIBLE_HEIGHT, np.ptp(np.nan_to_num(rows), axis=1))
     legible = np.clip((tall - LEAST_HEIGHT) / (LEGIBLE_HEIGHT - LEAST_HEIGHT), 0.0, 1.0)
     visible &= ~_hidden(camera.pose[:3, 3], points, boxes, others)

@@ -38,6 +38,8 @@ CAR_HEIGHT = 1.5
 """Height of a car [m]."""
 LEAST_HEIGHT = 8
 """Minimum height of the objects with which the networks are trained [px]."""
+INPUT_SIZE = (512, 384)
+"""Width and height of the input of the networks of this project [px]."""
 
 
 class ImageDetector(Detector):
@@ -45,8 +47,12 @@ class ImageDetector(Detector):
     ground.
 
     Of overlapping boxes from one or several cameras, the one with the highest score is kept.
+
+    input_size, letterbox  of the network, as in ImageNetwork
     """
 
+    input_size: tuple[int, int] = INPUT_SIZE
+    letterbox = False
     needs: ClassVar[frozenset[str]] = frozenset({"camera"})
     detectable_signals = frozenset({"light"})
     default_sensors: ClassVar[Mapping[str, SensorSettings]] = {
@@ -77,6 +83,7 @@ class ImageDetector(Detector):
         if self._network is None:
             self._network = self.build_network(allow_torchscript=allow_torchscript)
             self.detectable_signals = signal_kinds(self._network.classes)
+            self.input_size = self._network.input_size
 
     def setup(self, context: DetectorContext) -> None:
         """Store the map and the ray patterns of the lidars."""
@@ -155,15 +162,23 @@ class ImageDetector(Detector):
         return any(signal == light.id for camera in cameras for light in self._lights.in_view(camera))
 
     def range_of(self, sensor: SensorSettings) -> float:
-        """Return the distance at which the image of a car has the minimum height of objects in training [m]."""
+        """Return the distance at which a car in the network input has the minimum height of objects in training [m]."""
         if not isinstance(sensor, CameraSettings):
             return super().range_of(sensor)
         focal_length = sensor.width / (2.0 * math.tan(math.radians(sensor.fov) / 2.0))
-        return focal_length * CAR_HEIGHT / LEAST_HEIGHT
+        return focal_length * self._reduction(sensor.width, sensor.height) * CAR_HEIGHT / LEAST_HEIGHT
+
+    def _reduction(self, width: int, height: int) -> float:
+        """Return the share of its height that an image keeps in the network input; 1 if it is enlarged."""
+        ratio = self.input_size[1] / height
+        return min(1.0, ratio, self.input_size[0] / width) if self.letterbox else min(1.0, ratio)
 
     def in_view(self, boxes: Array, readings: Readings, detections: Detections) -> Array:
         """Return the maximum share (N,) of each box (N, 7) that one of the cameras can show."""
-        shares = [in_camera(boxes, reading, detections.boxes) for reading in readings.cameras.values()]
+        shares = [
+            in_camera(boxes, reading, detections.boxes, self._reduction(*reading.size))
+            for reading in readings.cameras.values()
+        ]
         return np.max(shares, axis=0) if shares else np.zeros(len(boxes))
 
     def signals(self) -> tuple[SignalReading, ...]:
@@ -207,6 +222,7 @@ class LearnedDetector(ImageDetector):
     def __init__(self, settings: LearnedSettings | None = None) -> None:
         super().__init__()
         self.settings = settings or LearnedSettings()
+        self.input_size, self.letterbox = self.settings.input_size or INPUT_SIZE, self.settings.letterbox
         path = weights_path(self.network, self.settings)
         check_weights_exist(path)
         self.library_versions = runtime_versions(runtime_of(path, self.settings))

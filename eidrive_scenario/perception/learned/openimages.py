@@ -74,6 +74,7 @@ class OpenImagesDetector(ImageDetector):
     """Detector `ssd_openimages`."""
 
     settings_type: ClassVar[type[Settings] | None] = OpenImagesSettings
+    input_size = (SIDE, SIDE)
 
     def __init__(self, settings: OpenImagesSettings | None = None) -> None:
         super().__init__()

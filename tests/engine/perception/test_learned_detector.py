@@ -60,6 +60,16 @@ def create(kind: type[LearnedDetector], **settings: object) -> LearnedDetector:
     return detector
 
 
+@pytest.mark.parametrize(("letterbox", "expected"), [(False, 18.75), (True, 14.0625)])
+def test_range_follows_height_of_car_in_network_input(letterbox: bool, expected: float) -> None:
+    """A focal length of 320 px is 100 px in the input if heights are reduced by 100/320, and 75 px if by 150/640.
+
+    1.5 m are 8 px high at 18.75 m and 14.06 m.
+    """
+    detector = create(YoloDetector, weights=str(ONNX), classes=("car",), input_size=(150, 100), letterbox=letterbox)
+    assert detector.range_of(CameraSettings(width=640, height=320, fov=90.0)) == pytest.approx(expected)
+
+
 @KINDS
 def test_detect_car_in_image_returns_car_in_world(kind: type[LearnedDetector], readings: Readings) -> None:
     found = create(kind).detect(readings)

@@ -54,9 +54,11 @@ def test_in_camera_object_behind_a_truck_is_hidden() -> None:
     assert in_camera(truck, camera(), truck)[0] == 1.0, "an object does not hide itself"
 
 
-def test_in_camera_small_object_is_out_of_view() -> None:
-    """1.55 m at focal length 400 px: 8 px high at 77 m, 20 px at 31 m."""
-    shares = in_camera(np.concatenate([box(100, 0), box(50, 0), box(25, 0)]), camera(), NONE)
+@pytest.mark.parametrize(("scale", "reduction"), [(1, 1.0), (4, 0.25)])
+def test_in_camera_small_object_is_out_of_view(scale: int, reduction: float) -> None:
+    """1.55 m at focal length 400 px in the input of the network: 8 px high at 77 m, 20 px at 31 m."""
+    lens = camera(scale * 800, scale * 600, scale * 400.0)
+    shares = in_camera(np.concatenate([box(100, 0), box(50, 0), box(25, 0)]), lens, NONE, reduction)
     assert shares[0] == 0.0
     assert 0.0 < shares[1] < 1.0
     assert shares[2] == 1.0

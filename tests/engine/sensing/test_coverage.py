@@ -78,8 +78,8 @@ def test_sector_of_mount_to_the_front_is_ahead(angles: tuple[float, float]) -> N
         ("lidar", LidarSettings(channels=11, lower_fov=-10.0, points_per_second=79200), 28.1),
         ("lidar", LidarSettings(channels=11, lower_fov=-10.0, points_per_second=79200, range=25.0), 25.0),
         ("pillars", LidarSettings(points_per_second=10_000_000, range=200.0), 51.2),
-        # A focal length of 400 px: 1.5 m are 8 px high at 75 m.
-        ("yolov5", CameraSettings(width=800, height=600, fov=90.0), 75.0),
+        # A focal length of 400 px, 256 px in the network input of 512 x 384: 1.5 m are 8 px high at 48 m.
+        ("yolov5", CameraSettings(width=800, height=600, fov=90.0), 48.0),
         ("ssd", CameraSettings(width=400, height=300, fov=90.0), 37.5),
     ],
 )
