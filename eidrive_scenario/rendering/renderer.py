@@ -27,7 +27,7 @@ from eidrive_scenario.rendering.shading import (
     together,
 )
 from eidrive_scenario.rendering.shadows import Shadows, dimmed, shadow_grid
-from eidrive_scenario.rendering.surfaces import add_reflections
+from eidrive_scenario.rendering.surfaces import LEVEL, RoadPlane, add_reflections
 from eidrive_scenario.world.camera import Pinhole, Radiance
 from eidrive_scenario.world.weather import Weather
 
@@ -60,7 +60,7 @@ class ImageContent(NamedTuple):
     """Inputs that determine the light in the pixels of an image.
 
     pose    (4, 4) camera to world, x right, y down, z forward
-    ground  height of the road below the camera, for reflections [m]
+    ground  plane of the road below the camera, for reflections
     """
 
     subjects: Subjects
@@ -68,7 +68,7 @@ class ImageContent(NamedTuple):
     weather: Weather
     pose: Array
     pinhole: Pinhole
-    ground: float
+    ground: RoadPlane
 
 
 class _Visible(NamedTuple):
@@ -165,7 +165,7 @@ def _forget_first(memory: dict[object, Any], most: int) -> None:
         del memory[next(iter(memory))]
 
 
-def _whole(subjects: Subjects, beams: Sequence[Beam], at: Circumstances, ground: float) -> _Canvas:
+def _whole(subjects: Subjects, beams: Sequence[Beam], at: Circumstances, ground: RoadPlane) -> _Canvas:
     """Return a completely drawn image."""
     cover, lit = _staged([*subjects.scenery, *subjects.actors], at)
     casters = [*subjects.standing, *subjects.decks, *subjects.actors, *subjects.unseen]
@@ -187,7 +187,7 @@ def _dimming(subjects: Subjects) -> list[MeshInstance]:
     return [each for each in (*subjects.standing, *subjects.actors) if each.label >= 0]
 
 
-def _draw(canvas: _Canvas, visible: _Visible, beams: Sequence[Beam], at: Circumstances, ground: float) -> None:
+def _draw(canvas: _Canvas, visible: _Visible, beams: Sequence[Beam], at: Circumstances, ground: RoadPlane) -> None:
     """Draw all pixels."""
     cover, surfaces = visible.cover, visible.lit.surfaces
     triangle = cover.triangle.ravel()
@@ -237,11 +237,11 @@ def _scenery(subjects: Subjects, at: Circumstances) -> _Kept:
     canvas = _Canvas.blank(cover.triangle.size)
     heights = at.grid.drawn([*subjects.standing, *subjects.decks]) if at.grid is not None else None
     open_sky = np.ones(at.view.shape, dtype=np.float32)
-    _draw(canvas, _Visible(cover, lit, Shadows.of(at.grid, heights), open_sky), (), at, 0.0)
+    _draw(canvas, _Visible(cover, lit, Shadows.of(at.grid, heights), open_sky), (), at, LEVEL)
     return _Kept(cover, lit, canvas, heights)
 
 
-def _renewed(cached: _Kept, subjects: Subjects, beams: Sequence[Beam], at: Circumstances, ground: float) -> _Canvas:
+def _renewed(cached: _Kept, subjects: Subjects, beams: Sequence[Beam], at: Circumstances, ground: RoadPlane) -> _Canvas:
     """Return the image, redrawn in areas of actors and their shadows, or completely if neighbors emit light too."""
     view = at.view
     staged = cull_and_project(subjects.actors, view.pose, view.pinhole)

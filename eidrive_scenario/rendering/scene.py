@@ -23,6 +23,7 @@ from eidrive_scenario.rendering.meshes.signs import sign, sign_face
 from eidrive_scenario.rendering.meshes.solids import polygon
 from eidrive_scenario.rendering.model import Light, MeshInstance, Model, gridded, merged, model, placed
 from eidrive_scenario.rendering.renderer import ImageContent, Renderer, Subjects
+from eidrive_scenario.rendering.surfaces import LEVEL, RoadPlane
 from eidrive_scenario.roads import RoadNetwork, surface_meshes
 from eidrive_scenario.roads.model.signal_states import GREEN, RED, YELLOW, lamp_colors, lamps, lit
 from eidrive_scenario.world.actor import ActorSpec, ExtraAxle, Vector3
@@ -188,14 +189,17 @@ class Visuals:
             glowing = {"window_lit": WINDOW_LIGHT} if weather.lamps_on and weather.sun_elevation < 3.0 else {}
             standing.insert(0, MeshInstance(self._buildings, np.eye(3), self._origin, -1, glowing))
         subjects = Subjects(self._ground, standing, actors, ignored, self._decks)
-        content = ImageContent(subjects, beams, weather, pose, pinhole, self._height_below(*pose[:3, 3].tolist()))
+        content = ImageContent(subjects, beams, weather, pose, pinhole, self._road_below(*pose[:3, 3].tolist()))
         return SceneImage(self._renderer, content)
 
-    def _height_below(self, x: float, y: float, z: float) -> float:
-        """Return the height of the nearest road at a camera [m]."""
+    def _road_below(self, x: float, y: float, z: float) -> RoadPlane:
+        """Return the plane of the nearest road at a camera."""
         roads = self._scenery.roads
         near = None if roads is None or self._scenery.level else roads.locate_at(x, y, z=z, reach=math.inf)
-        return 0.0 if roads is None or near is None else roads.pose(near).z
+        if roads is None or near is None:
+            return LEVEL
+        pose = roads.pose(near)
+        return RoadPlane(pose.z, rotation_matrix(pose.h, pose.p, pose.r)[:, 2])
 
     def _ground_parts(self) -> list[MeshInstance]:
         """Return roads with markings, and their undersides unless they are level, and surrounding land; split by a

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,14 +72,28 @@ _HEIGHT = 0.15
 """Minimum height above the road of reflected objects [m]."""
 
 
+class RoadPlane(NamedTuple):
+    """Plane of the road below a camera: its height there [m] and its normal (3,), a unit vector upwards."""
+
+    height: float
+    normal: Array
+
+    @property
+    def axes(self) -> Array:
+        """Axes (3, 3) as columns: two in the plane and the normal."""
+        x, _, z = self.normal.tolist()
+        along = np.array([z, 0.0, -x]) / math.hypot(x, z)
+        return np.column_stack([along, np.cross(self.normal, along), self.normal])
+
+
+LEVEL = RoadPlane(0.0, np.array([0.0, 0.0, 1.0]))
+
+
 def add_reflections(
     light: Floats, on_road: Integers, cover: Cover, view: CameraView, *,
-    open_sky: Floats, dome: Floats, wetness: float, ground: float,
+    open_sky: Floats, dome: Floats, wetness: float, ground: RoadPlane,
 ) -> None:  # fmt: skip
-    """Add reflections of a wet road to the luminance (P, 3) of pixels, from an image of half the resolution.
-
-    `ground` is the height of the road below the camera [m].
-    """
+    """Add reflections of a wet road to the luminance (P, 3) of pixels, from an image of half the resolution."""
 
     import cv2
 
@@ -85,14 +101,16 @@ def add_reflections(
         return
     numbers = np.arange(len(light)).reshape(view.shape)[::2, ::2]
     small = replace(view.pinhole.finer(0.5), width=numbers.shape[1], height=numbers.shape[0])
-    x, y, z = (part.reshape(numbers.shape) for part in view.directions(numbers.ravel()))
-    sky = sample(dome, x, y, np.abs(z))
+    axes, pose = ground.axes, view.pose.copy()
+    pose[:3, :3] = axes.T @ pose[:3, :3]
+    above_plane = CameraView(pose, view.pinhole)  # directions and places are along the axes of the plane
+    x, y, z = above_plane.directions(numbers.ravel())
+    sky = sample(dome, *(axes.astype(np.float32) @ np.stack([x, y, np.abs(z)])).reshape(3, *numbers.shape))
     some = numbers[cover.triangle[::2, ::2] >= 0]
-    image = mirrored(
-        light[some], view.places(some, cover.nearness), sky, ground - float(view.position[2]), view.pose, small
-    )
+    height = (ground.height - float(view.position[2])) * float(ground.normal[2])
+    image = mirrored(light[some], above_plane.places(some, cover.nearness), sky, height, pose, small)
     image = np.asarray(cv2.resize(blurred(image), view.shape[::-1], interpolation=cv2.INTER_LINEAR))
-    share = reflectance(np.abs(view.directions(on_road)[2]))
+    share = reflectance(np.abs(above_plane.directions(on_road)[2]))
     position = (view.position % 4096.0).astype(np.float32)
     x, y, _, _ = view.places(on_road, cover.nearness)
     share *= puddles(x + position[0], y + position[1], wetness, hollows())

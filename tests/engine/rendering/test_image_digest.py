@@ -17,6 +17,7 @@ from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.rendering.lamps import Beam
 from eidrive_scenario.rendering.model import MeshInstance, Model, gridded, model
 from eidrive_scenario.rendering.renderer import ImageContent, Subjects
+from eidrive_scenario.rendering.surfaces import RoadPlane
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, ExtraAxle, Placement
 from eidrive_scenario.world.appearance import AnimationState, Appearance, LightState, Visibility
@@ -250,7 +251,7 @@ def small_content() -> ImageContent:
     instance = MeshInstance(small_model(), np.eye(3), np.zeros(3), 1, {"paint": (1.0, 2.0, 3.0)})
     beam = Beam(np.zeros(3), np.eye(3), 0.5, False)
     subjects = Subjects([instance], [instance], [instance], [instance], [instance])
-    return ImageContent(subjects, [beam], Weather(), np.eye(4), Street.pinhole, 0.5)
+    return ImageContent(subjects, [beam], Weather(), np.eye(4), Street.pinhole, RoadPlane(0.5, np.eye(3)[2]))
 
 
 def variants(value: Any) -> list[Any]:

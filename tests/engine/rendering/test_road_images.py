@@ -1,4 +1,4 @@
-"""Tests of images of roads: decks of bridges, and distant coordinates."""
+"""Tests of images of roads: decks of bridges, distant coordinates, and reflections on wet slopes."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.rendering.tone_mapping import LUMA
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world import World
+from eidrive_scenario.world.actor import ActorSpec, Placement
 from eidrive_scenario.world.camera import Pinhole
 from eidrive_scenario.world.weather import Weather
 
@@ -91,3 +92,29 @@ def test_street_looks_the_same_at_any_coordinates(x: float, y: float) -> None:
     np.testing.assert_array_equal(np.isfinite(other.depth), np.isfinite(first.depth))
     np.testing.assert_allclose(other.depth, first.depth, rtol=1e-4)
     np.testing.assert_allclose(other.luminance, first.luminance, rtol=0.02)
+
+
+def reflection_below_crate(slope: float) -> np.ndarray:
+    """Return the mean light of the wet road before a red crate, of a camera and a crate that stand on the slope."""
+    pitch = -math.atan(slope)
+    pose = looking(20.0, -1.75, 10.0 + 20.0 * slope, pitch)
+    pose[:3, 3] -= 1.4 * pose[:3, 1]
+    crate = ActorSpec("Crate", "box", "misc", (2.0, 2.0, 2.0), (0.0, 0.0, 1.0), color=(0.9, 0.05, 0.05))
+    road = road_xml(length=200.0, lanes=LANES, profiles=elevation_xml(10.0, slope))
+    with World(RoadNetwork.parse(map_xml(road)), picture_maker=picture_maker) as world:
+        world.set_weather(Weather(wetness=1.0, cloud_cover=1.0, visual_range=1e9))
+        world.add(crate, Placement(32.0, -1.75, 10.0 + 32.0 * slope, 0.0, pitch))
+        image = world.radiance(pose, PINHOLE)
+    lines, columns = np.nonzero(image.segmentation == 0)
+    below = image.luminance[lines.max() + 2 : lines.max() + 10, columns.min() + 2 : columns.max() - 1]
+    mean: np.ndarray = below.mean(axis=(0, 1))
+    return mean
+
+
+@pytest.mark.parametrize("slope", [-0.1, -0.05, -0.02, 0.02, 0.05, 0.1])
+def test_wet_slope_reflects_as_level_road(slope: float) -> None:
+    """A crate before a camera is reflected by the plane on which both stand, whatever its inclination."""
+    level = reflection_below_crate(0.0)
+    inclined = reflection_below_crate(slope)
+    assert level[0] > 4.0 * level[2]
+    np.testing.assert_allclose(inclined / inclined.sum(), level / level.sum(), rtol=0.2)
