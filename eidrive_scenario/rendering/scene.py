@@ -193,12 +193,15 @@ class Visuals:
         return SceneImage(self._renderer, content)
 
     def _road_below(self, x: float, y: float, z: float) -> RoadPlane:
-        """Return the plane of the nearest road at a camera."""
+        """Return the plane of the nearest road at a camera, but of one below it rather than of a bridge above it."""
         roads = self._scenery.roads
         near = None if roads is None or self._scenery.level else roads.locate_at(x, y, z=z, reach=math.inf)
         if roads is None or near is None:
             return LEVEL
         pose = roads.pose(near)
+        if pose.z > z:
+            below = [pose for pose in map(roads.pose, roads.locations_at(x, y)) if pose.z <= z]
+            pose = max(below, key=lambda pose: pose.z, default=pose)
         return RoadPlane(pose.z, rotation_matrix(pose.h, pose.p, pose.r)[:, 2])
 
     def _ground_parts(self) -> list[MeshInstance]:

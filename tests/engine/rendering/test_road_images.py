@@ -10,6 +10,7 @@ import pytest
 from opendrive_xml import elevation_xml, lanes_xml, map_xml, road_xml
 
 from eidrive_scenario.rendering import picture_maker
+from eidrive_scenario.rendering.scene import SceneImage
 from eidrive_scenario.rendering.tone_mapping import LUMA
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.world import World
@@ -118,3 +119,11 @@ def test_wet_slope_reflects_as_level_road(slope: float) -> None:
     inclined = reflection_below_crate(slope)
     assert level[0] > 4.0 * level[2]
     np.testing.assert_allclose(inclined / inclined.sum(), level / level.sum(), rtol=0.2)
+
+
+@pytest.mark.parametrize(("z", "mirror"), [(3.0, 0.0), (7.0, 5.0)], ids=["below", "above"])
+def test_camera_near_deck_mirrors_in_the_road_below(bridge: World, z: float, mirror: float) -> None:
+    """At a height of 3 m the road is 3 m below and the deck only 2 m above."""
+    image = bridge.image(looking(50.0, -1.75, z), PINHOLE)
+    assert isinstance(image, SceneImage)
+    assert image.content.ground.height == mirror
