@@ -18,7 +18,7 @@ from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.rendering.tone_mapping import PixelNoise, tone_map, white_level
 from eidrive_scenario.sensing.precipitation import draw_drops_on_lens, draw_precipitation
 from eidrive_scenario.sensing.readings import CameraReading, DeferredImage
-from eidrive_scenario.sensing.sensor import Scene, Sensor, mounting
+from eidrive_scenario.sensing.sensor import Scene, Sensor, mounting, undistorted
 from eidrive_scenario.sensing.settings import CameraSettings, NoiseSettings, SensorSettings
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.camera import CameraImage, Pinhole, Radiance
@@ -52,7 +52,7 @@ def unexposed(settings: CameraSettings) -> CameraReading:
 
 @lru_cache(maxsize=32)
 def _distortion(settings: CameraSettings) -> _Distortion:
-    """Return the direction of each pixel center, found by iteration to 1e-9.
+    """Return the direction of each pixel center.
 
     Raise SettingError if a direction does not project within a tenth of a pixel of its center: strong coefficients that
     compensate each other do not converge.
@@ -62,14 +62,11 @@ def _distortion(settings: CameraSettings) -> _Distortion:
 
     lens = lens_of(settings)
     columns, rows = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
-    pixels = np.stack([columns.ravel(), rows.ravel()], axis=1)[:, None]
-    until = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-9)
-    same = np.eye(3)
-    undistorted = cv2.undistortPointsIter(pixels, lens.intrinsics, np.array(settings.distortion), same, same, until)
-    rays = np.asarray(undistorted, dtype=float)[:, 0]
+    pixels = np.stack([columns.ravel(), rows.ravel()], axis=1)
+    rays = undistorted(pixels, lens.intrinsics, settings.distortion)
     none, along = np.zeros(3), np.column_stack([rays, np.ones(len(rays))])
     projected = cv2.projectPoints(along, none, none, lens.intrinsics, np.array(settings.distortion))[0]
-    if not np.abs(projected - pixels).max() < 0.1:
+    if not np.abs(projected[:, 0] - pixels).max() < 0.1:
         what = f"distortion: the coefficients cannot be inverted (got {list(settings.distortion)})"
         raise SettingError(Diagnostic(what, "use smaller coefficients or a smaller fov"))
     low, high = rays.min(axis=0) * lens.focal - 1.0, rays.max(axis=0) * lens.focal + 1.0

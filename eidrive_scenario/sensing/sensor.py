@@ -117,20 +117,20 @@ def view_sectors(
         mount = mounting(settings, spec, "front" if isinstance(settings, CameraSettings) else "roof")
         half = math.radians(getattr(settings, "fov", getattr(settings, "field_of_view", 360.0))) / 2.0
         if isinstance(settings, CameraSettings) and any(settings.distortion):
-            half = _undistorted(half, settings.distortion)
+            edges = np.array([[-math.tan(half), 0.0], [math.tan(half), 0.0]])
+            # The nearer of the rays at the side edges of the image
+            half = math.atan(float(np.abs(undistorted(edges, np.eye(3), settings.distortion)[:, 0]).min()))
         sectors.append(ViewSector(mount.x, mount.y, mount.z, mount.heading, half, range_of(settings)))
     return tuple(sectors)
 
 
-def _undistorted(half: float, distortion: Sequence[float]) -> float:
-    """Return the angle [rad] of the nearer of the rays at the side edges of an image, which are at `half` without
-    distortion."""
+def undistorted(positions: Array, intrinsics: Array, distortion: Sequence[float] | Array) -> Array:
+    """Return image positions (N, 2) [px] in the plane at distance 1 from an undistorted camera, exact to 1e-9."""
     import cv2
 
-    edges, same = np.array([[[-math.tan(half), 0.0]], [[math.tan(half), 0.0]]]), np.eye(3)
-    until = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-9)
-    rays = cv2.undistortPointsIter(edges, same, np.array(distortion), same, same, until)
-    return math.atan(float(np.abs(rays[:, 0, 0]).min()))
+    same, until = np.eye(3), (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-9)
+    rays = cv2.undistortPointsIter(positions[:, None], intrinsics, np.array(distortion), same, same, until)
+    return np.asarray(rays, dtype=float)[:, 0]
 
 
 Point = tuple[float, float, float]

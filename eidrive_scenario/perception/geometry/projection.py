@@ -13,6 +13,7 @@ from eidrive_scenario.base.geometry import BOX_SAMPLES, box_corners, points_of_b
 from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame
 from eidrive_scenario.sensing.crossing import crossing
 from eidrive_scenario.sensing.readings import CameraReading, LidarReading
+from eidrive_scenario.sensing.sensor import undistorted
 
 NEAREST = 0.1
 """Minimum depth along the optical axis of a point in the image [m]."""
@@ -61,16 +62,10 @@ def straight_boxes(boxes: Array, camera: CameraReading) -> Array:
 
     The middle of each edge is transformed.
     """
-
-    import cv2
-
     x0, y0, x1, y1 = boxes.T
     x, y = (x0 + x1) / 2.0, (y0 + y1) / 2.0
     middles = np.stack([np.stack([x0, y], 1), np.stack([x, y0], 1), np.stack([x1, y], 1), np.stack([x, y1], 1)], 1)
-    flat: Any = cv2.undistortPoints(
-        np.ascontiguousarray(middles.reshape(-1, 1, 2)), camera.intrinsics, camera.distortion
-    )
-    rays = np.asarray(flat, dtype=float).reshape(-1, 4, 2)
+    rays = undistorted(middles.reshape(-1, 2), camera.intrinsics, camera.distortion).reshape(-1, 4, 2)
     return np.stack([rays[:, 0, 0], rays[:, 1, 1], rays[:, 2, 0], rays[:, 3, 1]], axis=1)
 
 

@@ -50,6 +50,16 @@ def test_straight_boxes_inverts_distortion() -> None:
     np.testing.assert_allclose(straight, [-0.2, -0.1, 0.1, 0.13], atol=0.004)
 
 
+@pytest.mark.parametrize("distortion", [(-0.28, 0.07, 0.001, -0.0005, 0.0), (0.3, 0.0, 0.0, 0.0, 0.0)])
+def test_straight_boxes_inverts_strong_distortion_in_whole_image(distortion: tuple[float, ...]) -> None:
+    """Boxes without extent at the images of points with tangents of up to 1.1 return to these tangents."""
+    view = camera(distortion=np.array(distortion))
+    tangents = np.stack(np.meshgrid(np.linspace(-1.1, 1.1, 12), np.linspace(-0.8, 0.8, 8)), axis=-1).reshape(-1, 2)
+    places, _ = pixels(np.column_stack([np.ones(96), -tangents[:, 0], 1.5 - tangents[:, 1]]), view)
+    straight = straight_boxes(np.tile(places, 2), view)
+    np.testing.assert_allclose(straight, np.tile(tangents, 2), atol=1e-6)
+
+
 @pytest.mark.parametrize("name", ["car", "truck", "pedestrian"])
 @pytest.mark.parametrize("distance", [10.0, 20.0, 40.0])
 @pytest.mark.parametrize("degrees", [0, 90, 150])
