@@ -33,7 +33,9 @@ class Mount(Settings):
 
 def _mount(value: Any) -> Any:
     """Return a mount given as a list as a mapping: x, y, z, then optional yaw and pitch."""
-    if isinstance(value, (list, tuple)) and all(isinstance(part, (int, float)) for part in value):
+    if isinstance(value, (list, tuple)) and all(
+        isinstance(part, (int, float)) and not isinstance(part, bool) for part in value
+    ):
         if not 3 <= len(value) <= 5:
             raise ValueError("three to five numbers are expected: x, y, z [m], yaw, pitch [degrees]")
         return dict(zip(("x", "y", "z", "yaw", "pitch"), value, strict=False))

@@ -150,6 +150,7 @@ WRONG = [
         "s.xosc:12: unknown setting 'sensors.truth.rnge'; did you mean 'range'?",
     ),
     ([("mount", "[1, 2]")], "three to five numbers are expected"),
+    ([("mount", "[0, 0, true]")], "'mount' is [0, 0, True]; a mapping is expected"),
 ]
 
 
