@@ -132,7 +132,7 @@ class Renderer:
         subjects, beams, weather, pose, pinhole, ground = content
         light = daylight(weather)
         view = CameraView(pose, pinhole)
-        grid = shadow_grid(light.towards, view) if light.sun.any() else None
+        grid = shadow_grid(light.towards, view, ground.height) if light.sun.any() else None
         at = Circumstances(view, weather, light, dome(weather), grid)
         felt = beams if float(light.ground.max()) < DAYLIGHT else ()
         cached = self._cached(subjects, at) if self.MOST_KEPT > 0 else None

@@ -1,4 +1,4 @@
-"""Tests of images of roads: decks of bridges, distant coordinates, and reflections on wet slopes."""
+"""Tests of images of roads: decks of bridges, distant coordinates, wet slopes, and low roads."""
 
 from __future__ import annotations
 
@@ -127,3 +127,22 @@ def test_camera_near_deck_mirrors_in_the_road_below(bridge: World, z: float, mir
     image = bridge.image(looking(50.0, -1.75, z), PINHOLE)
     assert isinstance(image, SceneImage)
     assert image.content.ground.height == mirror
+
+
+def shadow_pixels(height: float) -> int:
+    """Return the number of pixels in the shadow of a crate, on a road of this height [m] and in the same view."""
+    road = road_xml(length=200.0, lanes=LANES, profiles=elevation_xml(height))
+    crate = ActorSpec("Crate", "box", "misc", (2.0, 2.0, 2.0), (0.0, 0.0, 1.0))
+    with World(RoadNetwork.parse(map_xml(road)), picture_maker=picture_maker) as world:
+        world.set_weather(Weather(sun_azimuth=0.0, sun_elevation=35.0, cloud_cover=0.0))
+        pose = looking(20.0, -1.75, height + 1.6, 0.05)
+        before = world.radiance(pose, PINHOLE).luminance
+        world.add(crate, Placement(32.0, -1.75, height))
+        image = world.radiance(pose, PINHOLE)
+    return int(((image.luminance < 0.5 * before).all(axis=-1) & (image.segmentation < 0)).sum())
+
+
+@pytest.mark.parametrize("height", [-50.0, -3.0])
+def test_shadow_on_low_road_is_that_on_level_road(height: float) -> None:
+    assert shadow_pixels(0.0) > 30
+    assert shadow_pixels(height) == pytest.approx(shadow_pixels(0.0), rel=0.1)
