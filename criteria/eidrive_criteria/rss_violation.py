@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from eidrive_criteria.folds import exceeds
@@ -69,11 +70,14 @@ class RssViolation(SurroundedCriterion):
         view = frame.view
         if self.missing:
             self.missing.difference_update(view.names)
-        if self.of not in view.rows:
+        row = view.rows.get(self.of)
+        if row is None:
             return
         self._ticks += 1
         violated = False
-        for relation in self.surroundings.relations(view, self.of, self.others):
+        speeds = np.hypot(view.velocity[:, 0], view.velocity[:, 1])
+        reach = self._model.longest(float(speeds[row]), float(speeds.max()))
+        for relation in self.surroundings.relations(view, self.of, self.others, reach):
             # A body that overlaps from behind is a coupled trailer, or has hit this one.
             behind = relation.ahead < 0.0 and (relation.gap > 0.0 or relation.side_gap == 0.0)
             if behind or relation.crosses or math.hypot(relation.speed, relation.side_speed) < STANDING:

@@ -117,7 +117,9 @@ class YieldToEmergencyVehicle(SurroundedCriterion):
         here, there = (self._locate(view, row) for row in (own, other))
         if roads is None or here is None or there is None:
             relation = next(self._straight.relations(view, settings.of, self.others), None)
-            return relation and Pursuit(relation.ahead, relation.gap, relation.other_speed > 0.0)
+            if relation is None or relation.side_gap > BEHIND:
+                return None
+            return Pursuit(relation.ahead, relation.gap, relation.other_speed > 0.0)
         distance, runs = roads.distance(here, there), roads.orientation(here, there)
         if distance is None or runs is None:
             return None

@@ -36,6 +36,11 @@ class SafeDistanceModel:
         first = self._reaction(in_own_lane) + self._after(in_own_lane) ** 2 / (2.0 * self.min_braking_correct)
         return first + self._reaction(against) + self._after(against) ** 2 / (2.0 * self.min_braking)
 
+    def longest(self, own: float, fastest: float) -> float:
+        """Return the largest minimum gap [m] of an actor with speed `own` to any other, with speed up to `fastest`."""
+        opposite = max(self.opposite(own, fastest), self.opposite(fastest, own))
+        return max(self.same_direction(own, 0.0), opposite)
+
     def lateral(self, left: float, right: float) -> float:
         """Return the minimum lateral distance of a left and a right actor [m]; speeds are positive to the right."""
         rho, gain, braking = self.reaction_time, self.lateral_acceleration, self.lateral_braking

@@ -18,7 +18,7 @@ from eidrive_scenario.world.view import WorldView
 SPACING = 1.0
 """Distance of the sample points of a lane along the reference line [m]."""
 RANGE = 200.0
-"""Maximum distance of the actors that are considered [m]."""
+"""Maximum gap to the actors that are considered, unless a larger one is requested [m]."""
 STEP = 5
 """Number of sample points of a lane per point to which actors are compared."""
 BESIDE = 15.0
@@ -124,14 +124,15 @@ class Relation(NamedTuple):
 class LaneCoordinates:
     """Actors in the coordinates of the lane of one of them.
 
-    Chains of lanes reach about RANGE beyond the first road. They are computed when needed.
+    Chains of lanes reach at least as far beyond the first road as requested, in multiples of RANGE. They are computed
+    when needed.
     """
 
     def __init__(self, roads: RoadNetwork) -> None:
         self._roads = roads
         self._hints: dict[str, LaneLocation | None] = {}
         """Last location of each actor."""
-        self._chains: dict[tuple[LaneKey, int], LaneChain] = {}
+        self._chains: dict[tuple[LaneKey, int, int], LaneChain] = {}
 
     def own_lane(self, view: WorldView, row: int) -> tuple[LaneLocation, int] | None:
         """Return the location of an actor on its lane and its direction in s; None off the road."""
@@ -141,11 +142,13 @@ class LaneCoordinates:
         heading = self._roads.road_pose_at(location.road, location.s).h
         return location, 1 if math.cos(yaw - heading) >= 0.0 else -1
 
-    def in_reach(self, view: WorldView, row: int, near: list[int], location: LaneLocation, direction: int) -> list[int]:
+    def in_reach(
+        self, view: WorldView, row: int, near: list[int], location: LaneLocation, direction: int, reach: float
+    ) -> list[int]:
         """Return the actors beside the lane and those in the straight path; the others are ignored."""
-        chain = self._chain(location, direction)
+        chain = self._chain(location, direction, reach)
         begun = chain.roads[location.road].along(location.s)
-        first, last = np.searchsorted(chain.along, (begun - 2.0 * BESIDE, begun + RANGE + SPACING)).tolist()
+        first, last = np.searchsorted(chain.along, (begun - 2.0 * BESIDE, begun + reach + 2.0 * BESIDE)).tolist()
         boxes = view.boxes[near]
         offset = boxes[:, None, :2] - chain.points[first:last:STEP]
         beside = (np.square(offset).sum(axis=-1) <= BESIDE * BESIDE).any(axis=1)
@@ -155,12 +158,12 @@ class LaneCoordinates:
         return [near[index] for index in np.flatnonzero(beside | straight).tolist()]
 
     def bodies(
-        self, view: WorldView, row: int, other: int, location: LaneLocation, direction: int
+        self, view: WorldView, row: int, other: int, location: LaneLocation, direction: int, reach: float
     ) -> tuple[_Body, _Body] | None:
         """Return both bodies in the coordinates of the lane; None if the road bends away before the other one."""
         own, body = view.plain_boxes[row], view.plain_boxes[other]
         there = self._locate(view, other)
-        chain = self._chain(location, direction)
+        chain = self._chain(location, direction, reach)
         begun = chain.roads[location.road].along(location.s)
         road = None if there is None else chain.roads.get(there.road)
         if there is None or road is None:
@@ -189,13 +192,14 @@ class LaneCoordinates:
         heading = self._roads.road_pose_at(location.road, location.s).h
         return heading if direction > 0 else heading + math.pi
 
-    def _chain(self, location: LaneLocation, direction: int) -> LaneChain:
+    def _chain(self, location: LaneLocation, direction: int, reach: float) -> LaneChain:
         """Return the chain of the lane of an actor that moves in a direction of s."""
         road = self._roads.roads[location.road]
         key = LaneKey(location.road, road.section_at(location.s).index, location.lane)
-        chain = self._chains.get((key, direction))
+        multiple = math.ceil(reach / RANGE)
+        chain = self._chains.get((key, direction, multiple))
         if chain is None:
-            chain = self._chains[key, direction] = self._build(key, direction)
+            chain = self._chains[key, direction, multiple] = self._build(key, direction, multiple * RANGE)
         return chain
 
     def _center(self, chain: RoadOfChain, number: str, s: float) -> float:
@@ -207,7 +211,7 @@ class LaneCoordinates:
             s = min(max(s, section.s), section.end)
         return lane_t(road, section, section.lanes[chain.lanes[section.index]], s)[0]
 
-    def _build(self, key: LaneKey, direction: int) -> LaneChain:
+    def _build(self, key: LaneKey, direction: int, reach: float) -> LaneChain:
         first = self._roads.roads[key.road]
         lanes = {key.road: {key.section: key.lane}}
         extents = {key.road: (0.0, direction, first.length)}
@@ -217,7 +221,7 @@ class LaneCoordinates:
             if behind is not None:
                 lanes[key.road][behind.section] = behind.lane
         length, way, last = first.length, direction, key
-        while length - first.length <= RANGE:
+        while length - first.length <= reach + 2.0 * BESIDE:  # the centers of long bodies are beyond the gap
             following = self._next_section(last, way)
             if following is None:
                 ways = list(self._roads.links.beyond(last, way))
@@ -288,20 +292,23 @@ class Surroundings:
     def __init__(self, roads: RoadNetwork | None) -> None:
         self._lanes = None if roads is None else LaneCoordinates(roads)
 
-    def relations(self, view: WorldView, of: str, to: Collection[str] | None = None) -> Iterator[Relation]:
-        """Yield the relation to each other actor within RANGE, or to those named `to`; none if `of` is absent."""
+    def relations(
+        self, view: WorldView, of: str, to: Collection[str] | None = None, reach: float = 0.0
+    ) -> Iterator[Relation]:
+        """Yield the relation to each other actor, or to those named `to`; none if `of` is absent.
+
+        The gap is at most RANGE, or `reach` if it is larger [m].
+        """
         row = view.rows.get(of)
         if row is None:
             return
-        boxes = view.plain_boxes
+        boxes, reach = view.plain_boxes, max(reach, RANGE)
         own = boxes[row]
         near = [
             other
             for other, name in enumerate(view.names)
             if other != row
             and (to is None or name in to)
-            and abs(boxes[other][0] - own[0]) <= RANGE
-            and abs(boxes[other][1] - own[1]) <= RANGE
             and abs(boxes[other][2] - own[2]) <= (boxes[other][5] + own[5]) / 2.0 + 2.0
         ]
         if not near:
@@ -309,13 +316,15 @@ class Surroundings:
         lanes = self._lanes
         lane = None if lanes is None else lanes.own_lane(view, row)
         if lanes is None or lane is None:
-            for other in near:
-                yield _relation(view.names[other], *_straight(view, row, other))
-            return
-        for other in lanes.in_reach(view, row, near, *lane):
-            bodies = lanes.bodies(view, row, other, *lane)
-            if bodies is not None:  # else the road bends away before it
-                yield _relation(view.names[other], *bodies, wrong_way=lanes.is_wrong_way(*lane))
+            relations = [_relation(view.names[other], *_straight(view, row, other)) for other in near]
+        else:
+            wrong_way = lanes.is_wrong_way(*lane)
+            relations = [
+                _relation(view.names[other], *bodies, wrong_way=wrong_way)
+                for other in lanes.in_reach(view, row, near, *lane, reach)
+                if (bodies := lanes.bodies(view, row, other, *lane, reach)) is not None  # else the road bends away
+            ]
+        yield from (relation for relation in relations if relation.gap <= reach)
 
     def leader(self, view: WorldView, of: str, to: Collection[str] | None = None) -> Relation | None:
         """Return the nearest actor ahead in the path of an actor, or None. `to` restricts the candidates."""

@@ -1,5 +1,6 @@
 """Criteria on the leader: boxes 4 m by 2 m, values from the definitions."""
 
+import math
 from typing import Any
 
 import pytest
@@ -59,6 +60,16 @@ def test_only_an_actor_ahead_in_the_path_leads(
     else:
         assert (verdict.passed, verdict.value) == (True, None)
         assert "never had" in verdict.reason
+
+
+@pytest.mark.parametrize("yaw", [0.0, math.pi / 4.0])
+@pytest.mark.parametrize(("gap", "leads"), [(199.9, True), (200.1, False)])
+def test_leader_has_a_gap_of_up_to_200_m(frame: Any, car: Any, gap: float, leads: bool, yaw: float) -> None:
+    """Bodies of 4 m and 18 m: the centers are 11 m farther apart than the bodies."""
+    away = gap + 11.0
+    cars = {"Ego": car(0, yaw=yaw, speed=10.0), "Lead": car(away * math.cos(yaw), away * math.sin(yaw), yaw, 5.0)}
+    verdict = judge(headway(), [frame(0.0, cars, sizes={"Lead": (18.0, 2.5, 4.0)})])
+    assert verdict.value == (pytest.approx(gap / 10.0) if leads else None)
 
 
 def test_nearest_actor_leads_unless_to_selects_another(frame: Any, car: Any) -> None:

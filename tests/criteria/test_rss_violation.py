@@ -52,6 +52,22 @@ def test_actors_without_duty_of_distance(frame: Any, car: Any, other: Any, what:
     assert (verdict.passed, verdict.value) == (True, 0.0), what
 
 
+@pytest.mark.parametrize("yaw", [0.0, math.pi / 4.0])
+@pytest.mark.parametrize(("gap", "passed"), [(390.85, True), (390.8, False), (246.0, False)])
+def test_oncoming_distance_in_any_direction(frame: Any, car: Any, gap: float, passed: bool, yaw: float) -> None:
+    """Both at 30 m/s: 2 x (30 + 1.75) + 33.5 ** 2 / 6 + 33.5 ** 2 / 8 = 390.823 m."""
+    away = gap + 4.0
+    other = car(away * math.cos(yaw), away * math.sin(yaw), yaw + math.pi, 30.0)
+    assert judge([frame(0.0, {"Ego": car(0, yaw=yaw, speed=30.0), "Other": other})]).passed is passed
+
+
+@pytest.mark.parametrize(("side", "passed"), [(276.0, True), (275.0, False)])
+def test_actor_far_beside_that_approaches(frame: Any, car: Any, side: float, passed: bool) -> None:
+    """20 m/s to the side need 0.1 + 20.1 + 20.2 ** 2 / 1.6 + 0.125 = 275.35 m; the body extends 3 m / sqrt(2)."""
+    other = car(0.0, side + 1.0 + 3.0 / math.sqrt(2.0), -math.pi / 4.0, 20.0 * math.sqrt(2.0))
+    assert judge([frame(0.0, {"Ego": car(0, speed=10.0), "Other": other})]).passed is passed
+
+
 def test_standing_ego_causes_no_violation(frame: Any, car: Any) -> None:
     assert judge([frame(0.0, {"Ego": car(0), "Lead": car(5)})]).passed
 

@@ -7,7 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from opendrive_xml import lane_xml, lanes_xml, map_xml, ring_xml, road_xml, section_xml
+from opendrive_xml import (
+    lane_xml,
+    lanes_xml,
+    map_xml,
+    predecessor_xml,
+    ring_xml,
+    road_xml,
+    section_xml,
+    successor_xml,
+)
 
 from eidrive_scenario.evaluation.surroundings import Relation, Surroundings
 from eidrive_scenario.roads import RoadNetwork
@@ -163,6 +172,25 @@ def test_car_beyond_the_end_of_the_own_lane_is_beside() -> None:
     roads = RoadNetwork.parse(map_xml(road_xml(length=200.0, lanes=lanes)))
     assert relation(roads, ("1", -2, 20.0), ("1", -1, 120.0)).left == pytest.approx(3.5)
     assert relation(roads, ("1", -1, 20.0), ("1", -1, 120.0)).leads
+
+
+@pytest.mark.parametrize(("reach", "aheads"), [(200.0, []), (400.0, [301.75])])
+def test_gap_beyond_200_m_follows_the_lane(reach: float, aheads: list[float]) -> None:
+    """10 m of road a, 240 m of b and 50 m of c, which turns left with a radius of 50 m, 51.75 m in the right lane."""
+    lanes = section_xml(lane_xml(1), lane_xml(-1, link='<predecessor id="-1"/><successor id="-1"/>'))
+    roads = RoadNetwork.parse(
+        map_xml(
+            road_xml("a", length=20.0, link=successor_xml("b"), lanes=lanes),
+            road_xml("b", length=240.0, x=20.0, link=predecessor_xml("a") + successor_xml("c"), lanes=lanes),
+            road_xml("c", length=100.0, x=260.0, curvature=1.0 / 50.0, link=predecessor_xml("b"), lanes=lanes),
+        )
+    )
+    cars = view(
+        Ego=(10.0, -1.75, 0.0, 5.0), Lead=(260.0 + 51.75 * math.sin(1.0), 50.0 - 51.75 * math.cos(1.0), 1.0, 5.0)
+    )
+    relations = list(Surroundings(roads).relations(cars, "Ego", reach=reach))
+    assert [each.ahead for each in relations] == pytest.approx(aheads, rel=1e-3)
+    assert all(each.leads for each in relations)
 
 
 @pytest.mark.parametrize(("lane", "radius"), [(-2, 25.25), (-1, 21.75), (1, 18.25), (2, 14.75)])
