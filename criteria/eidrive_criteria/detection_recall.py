@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated
 
 from pydantic import Field
 
+from eidrive_criteria.folds import share_margin
 from eidrive_criteria.perceived import Group, PerceivedSettings, RecalledCriterion, RecalledSettings
 
 
@@ -28,6 +30,13 @@ class DetectionRecall(RecalledCriterion):
 
     def value_of(self, group: Group) -> float | None:
         return self.recall(self._settings.source, group)
+
+    def metrics(self) -> Mapping[str, float]:
+        """Return the recall of each group that had objects, and the margin to a lower limit that is nearer."""
+        settings, value = self._settings, self.value_of(self._settings.objects)
+        if value is None or settings.limit_of(value) != settings.at_least:
+            return super().metrics()
+        return {**super().metrics(), **share_margin(self.name, value, settings.at_least)}
 
     def describe(self, objects: str) -> str:
         share = self.value_of(self._settings.objects) or 0.0

@@ -77,10 +77,22 @@ class BoundedSettings(CriterionSettings):
         return exceeds(value, self.at_most)
 
     def limit_of(self, value: float | None) -> float | None:
-        """Return the limit that a verdict states: the violated one, else the lower one if there is one."""
-        if self.at_least is None or (value is not None and self.is_above(value)):
-            return self.at_most
-        return self.at_least
+        """Return the limit that a verdict states: the one nearer to the value, so a violated one; without a value the
+        lower one if there is one.
+        """
+        if self.at_least is None or self.at_most is None or value is None:
+            return self.at_most if self.at_least is None else self.at_least
+        return min(self.at_least, self.at_most, key=lambda limit: abs(value - limit))
+
+
+def share_margin(name: str, share: float, at_least: float | None) -> dict[str, float]:
+    """Return the metric `margin` of a share with a minimum: 0 at the minimum and 1 at a share of 1, the best one.
+
+    Empty without a minimum.
+    """
+    if not at_least:
+        return {}
+    return {f"{name}.margin": (share - at_least) / (1.0 - at_least) if at_least < 1.0 else share}
 
 
 def require_two_actors(settings: TwoActors) -> TwoActors:

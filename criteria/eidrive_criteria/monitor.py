@@ -54,5 +54,8 @@ class Monitor(Criterion):
         )
 
     def metrics(self) -> Mapping[str, float]:
-        """Return the time of the last change [s]."""
-        return {f"monitor.{self._settings.of}.changed": self._changed} if self._value is not None else {}
+        """Return the time of the last change [s], and the margin: 1 for the expected value, else 0."""
+        if self._value is None:
+            return {}
+        margin = float(self._value == self._settings.expected)
+        return {f"monitor.{self._settings.of}.changed": self._changed, f"{self.name}.margin": margin}

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from eidrive_criteria.folds import falls_below
+from eidrive_criteria.folds import falls_below, share_margin
 from eidrive_criteria.linked import LinkCriterion, LinkSettings
 from eidrive_scenario.api.common import counted
 from eidrive_scenario.api.criteria import Verdict
@@ -52,6 +52,6 @@ class PacketReceptionRatio(LinkCriterion):
         )
 
     def metrics(self) -> Mapping[str, float]:
-        """Return the ratio; empty without messages."""
+        """Return the ratio, and its margin with a limit; empty without messages."""
         value = self._ratio()
-        return {} if value is None else {self.name: value}
+        return {} if value is None else {self.name: value, **share_margin(self.name, value, self._limit)}

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from eidrive_criteria.folds import share_margin
 from eidrive_criteria.routed import RouteCriterion, RouteSettings
 from eidrive_scenario.api.common import EPSILON
 from eidrive_scenario.api.criteria import Place, Verdict
@@ -71,8 +72,9 @@ class RouteCompletion(RouteCriterion):
         )
 
     def metrics(self) -> Mapping[str, float]:
-        """Return the completed share and the length of the route [m]."""
+        """Return the completed share, its margin, and the length of the route [m]."""
         value = self._share()
         if value is None or self.route is None:
             return {}
-        return {f"{self.name}.{self.of}": value, f"{self.name}.{self.of}.length": self.route.length}
+        metrics = {f"{self.name}.{self.of}": value, f"{self.name}.{self.of}.length": self.route.length}
+        return metrics | share_margin(self.name, value, self._settings.at_least)

@@ -88,6 +88,13 @@ def traffic(exchange: Any) -> list[Any]:
     )
 
 
+def test_margin_of_packet_reception_is_relative_to_the_possible_losses(traffic: list[Any]) -> None:
+    """The ratio is 0.8."""
+    criterion = PacketReceptionRatio(PacketReceptionRatioSettings(receiver="Ego", at_least=0.6))
+    judge(criterion, traffic)
+    assert criterion.metrics()["packet_reception_ratio.margin"] == pytest.approx(0.5)
+
+
 def test_packet_reception_ratio(traffic: list[Any]) -> None:
     assert ratio(traffic, sender="A", receiver="Ego").value == 0.75
     assert ratio(traffic, receiver="Ego").value == 0.8

@@ -39,6 +39,13 @@ def test_monitor_value_at_the_end_or_throughout(
     assert (found.passed, found.first_violation) == (passed, violation)
 
 
+@pytest.mark.parametrize("value", [True, False])
+def test_monitor_with_the_expected_value_has_the_margin_1(frame: Any, value: bool) -> None:
+    criterion = Monitor(MonitorSettings(of="Seen", expected=True))
+    evaluate_criteria([replace(frame(0.0, {}), monitors={"Seen": value})], [criterion])
+    assert criterion.metrics()["monitor.margin"] == float(value)
+
+
 def test_monitor_is_fatal_with_throughout_only(frame: Any) -> None:
     assert verdict(frame, [True, False], fatal=True, throughout=True).fatal
     assert not verdict(frame, [False, False], fatal=True).fatal

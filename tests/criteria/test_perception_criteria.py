@@ -85,6 +85,23 @@ def test_limits_of_recall_and_gain(queue: Any) -> None:
         CooperationGainSettings(of="Ego", at_least=1.1)
 
 
+@pytest.mark.parametrize(
+    ("settings", "margin"),
+    [
+        ({"objects": "visible", "at_least": 0.8}, 1.0),
+        ({"at_least": 0.4}, 0.1 / 0.6),
+        ({"at_least": 0.4, "at_most": 0.9}, 0.1 / 0.6),
+        ({"at_least": 0.1, "at_most": 0.6}, None),
+        ({"at_most": 0.6}, None),
+    ],
+)
+def test_margin_of_recall_is_1_at_all_objects(queue: Any, settings: dict[str, Any], margin: float | None) -> None:
+    """The recall of all objects is 0.5, that of visible ones 1."""
+    criterion = DetectionRecall(DetectionRecallSettings(of="Ego", range=46, **settings))
+    judge(criterion, queue())
+    assert criterion.metrics().get("detection_recall.margin") == (None if margin is None else pytest.approx(margin))
+
+
 def test_silent_station_is_no_helper(queue: Any) -> None:
     """A and C are hidden then: one of four objects is known."""
     verdict = recall(queue(sends=False), objects="helper_only")

@@ -96,6 +96,17 @@ def test_limits_of_completion(frame: Any, car: Any) -> None:
     assert not completion(frames, route=STRAIGHT, at_least=0.5, within=19).passed
 
 
+@pytest.mark.parametrize(
+    ("end", "at_least", "margin"), [(80, 0.6, 0.5), (100, 0.6, 1.0), (100, 0.99, 1.0), (80, 0, None)]
+)
+def test_margin_of_completion_is_1_at_the_end(
+    frame: Any, car: Any, end: int, at_least: float, margin: float | None
+) -> None:
+    criterion = RouteCompletion(RouteCompletionSettings(of="Ego", route=tuple(STRAIGHT), at_least=at_least))
+    judge(criterion, drive(frame, car, *((float(x), 0.0) for x in range(0, end + 1, 20))))
+    assert criterion.metrics().get("route_completion.margin") == (None if margin is None else pytest.approx(margin))
+
+
 def test_route_there_and_back(frame: Any, car: Any) -> None:
     route = [(0.0, 0.0), (60.0, 0.0), (0.0, 0.0)]
     there = [(0.0, 0.0), (20.0, 0.0), (40.0, 0.0), (60.0, 0.0)]

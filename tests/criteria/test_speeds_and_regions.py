@@ -56,6 +56,11 @@ def test_average_speed_is_distance_over_time(frame: Any, car: Any) -> None:
     assert (verdict.passed, verdict.limit) == (False, 8.3)
 
 
+@pytest.mark.parametrize(("speed", "limit"), [(1.0, 2.0), (2.5, 2.0), (6.99, 7.0), (8.0, 7.0)])
+def test_verdict_states_the_nearer_one_of_two_limits(frame: Any, car: Any, speed: float, limit: float) -> None:
+    assert judge(average(at_least=2.0, at_most=7.0), speeds(frame, car, speed)).limit == limit
+
+
 def test_average_speed_in_one_frame_and_with_absence(frame: Any, car: Any) -> None:
     assert judge(average(at_least=7.0), speeds(frame, car, 7.0)).value == 7.0
     frames = speeds(frame, car, 4.0, 4.0)

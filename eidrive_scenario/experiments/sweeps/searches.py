@@ -254,7 +254,7 @@ def falsify(
     """Search a space for failed runs with Optuna's TPE sampler, and return the most different ones.
 
     objective  metric or column of the result whose small values are near a failure, such as `min_distance.A.B.box`;
-               None: the least margin of all criteria with a value and a limit, relative to the limit
+               None: the least margin of all criteria with a value and a limit, relative to the larger one of both
     shown      function that gets the numbers of different runs and of failures after each batch
 
     The sampler may propose a combination of lists again; it counts once.
@@ -340,10 +340,11 @@ def _objective(run: StoredRun, name: str | None) -> float | None:
 
 
 def _margin(run: StoredRun, criterion: str) -> float | None:
-    """Return the margin of a criterion: distance of its value from its limit over the limit, negative if it failed.
+    """Return the margin of a criterion: distance of its value from its limit over the larger one of both, at most 1 for
+    values and limits of equal sign, negative if it failed.
 
     The metric `margin` of a criterion takes precedence if it passed. One that passed without value or limit has none:
-    it would hide the larger margins of others.
+    it would hide the larger margins of others, as would a margin over the limit, which has no maximum.
     """
     passed = bool(run.result[f"{criterion}.passed"])
     stated: Any = run.result.get(f"{criterion}.margin")
@@ -352,7 +353,8 @@ def _margin(run: StoredRun, criterion: str) -> float | None:
     value: Any = run.result.get(f"{criterion}.value")
     limit: Any = run.result.get(f"{criterion}.limit")
     if _is_number(value) and _is_number(limit) and limit != 0 and math.isfinite(limit):
-        margin = abs(float(value - limit) / float(limit))
+        smaller, larger = sorted((abs(float(value)), abs(float(limit))))
+        margin = 1.0 - math.copysign(smaller / larger, float(value) * float(limit))
         return margin if passed else -margin
     return None if passed else -1.0
 
