@@ -11,7 +11,7 @@ from eidrive_scenario.api.criteria import LaneTracker
 AGAINST = math.cos(math.radians(120.0))
 """Cosine of the angle between an actor and its lane from which on the lane is the wrong one."""
 STILL = 0.02
-"""Movements of one step that are ignored [m]."""
+"""Speed up to which an actor stands [m/s]: its movement is ignored."""
 
 
 class WrongLaneSettings(SummedSettings):
@@ -32,7 +32,7 @@ class WrongLane(SummedCriterion):
 
     def increment(self, view: WorldView, row: int, duration: float, distance: float) -> float | None:
         against = drives_against_lane(self.lanes, view, row)
-        return distance if against and distance >= STILL else None
+        return distance if against and distance > STILL * duration else None
 
 
 def drives_against_lane(lanes: LaneTracker, view: WorldView, row: int) -> bool:

@@ -8,6 +8,7 @@ from eidrive_criteria.end_of_road import EndOfRoad, EndOfRoadSettings
 from eidrive_criteria.keep_lane import KeepLane, KeepLaneSettings
 from eidrive_criteria.off_road import OffRoad, OffRoadSettings
 from eidrive_criteria.on_sidewalk import OnSidewalk, OnSidewalkSettings
+from eidrive_criteria.outside_route_lanes import OutsideRouteLanes, OutsideRouteLanesSettings
 from eidrive_criteria.wrong_lane import WrongLane, WrongLaneSettings
 
 from eidrive_scenario.api.common import RoadNetwork, SettingError
@@ -111,6 +112,21 @@ def test_wrong_lane_distance(frame: Any, car: Any, roads: RoadNetwork) -> None:
     assert (verdict.passed, verdict.first_violation) == (False, 1.0)
     assert verdict.value == pytest.approx(math.hypot(2.5, 2.0) + 5.0)
     assert judge(WrongLane(WrongLaneSettings(of="Ego", at_most=9.0)), frames, roads).passed
+
+
+@pytest.mark.parametrize("step", [0.01, 0.05, 0.5])
+@pytest.mark.parametrize(("speed", "distance"), [(0.01, 0.0), (0.03, 0.3), (0.3, 3.0), (1.0, 10.0)])
+def test_distance_against_the_lane_does_not_depend_on_the_step(
+    frame: Any, car: Any, roads: RoadNetwork, step: float, speed: float, distance: float
+) -> None:
+    """10 s in the left lane; up to 0.02 m/s the Ego stands."""
+    frames = [
+        frame(step * n, {"Ego": car(-60.0 + speed * step * n, 3.5, speed=speed)}) for n in range(round(10 / step) + 1)
+    ]
+    assert judge(WrongLane(WrongLaneSettings(of="Ego")), frames, roads).value == pytest.approx(distance)
+    outside = OutsideRouteLanes(OutsideRouteLanesSettings(of="Ego"))
+    assert judge(outside, frames, roads).value == float(distance > 0.0)
+    assert outside.metrics()["outside_route_lanes.Ego.driven"] == pytest.approx(distance)
 
 
 def test_wrong_lane_excludes_the_right_direction_reversing_and_junctions(
