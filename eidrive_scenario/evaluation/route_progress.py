@@ -10,12 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.roads import RoadNetwork, RouteError
 
 AHEAD, BEHIND = 30.0, 10.0
-"""Distances along the route from the last place within which the next place is searched [m]."""
+"""Distances along the route from the last place within which the next place is searched [m]; a longer step extends
+them, backwards only if it leads nearer to the route by more than SAME, as routes there and back coincide."""
 SAME = 1.0
-"""Additional distance from the route up to which the first one of several near places is the start [m]."""
+"""Difference in the distance from the route up to which places are equally near [m]; the first one is the start."""
 SPACING = 2.0
 """Maximum spacing of the points of a route over lanes [m]."""
 
@@ -42,6 +44,8 @@ class RouteProgress:
         self._points = plan[kept]
         self._along = np.concatenate([[0.0], np.cumsum(steps[steps > 0.0])])
         self._last: float | None = None
+        self._position = (0.0, 0.0)
+        """Position of the actor at the last place [m]."""
 
     @property
     def length(self) -> float:
@@ -53,7 +57,11 @@ class RouteProgress:
         along, away = self._projections(x, y)
         near = np.ones(len(away), dtype=bool)
         if self._last is not None:
-            near = (along >= self._last - BEHIND) & (along <= self._last + AHEAD)
+            moved = math.dist(self._position, (x, y)) + EPSILON
+            ahead = along <= self._last + max(AHEAD, moved)
+            near, behind = (ahead & (along >= self._last - limit) for limit in (BEHIND, max(BEHIND, moved)))
+            if away[near].min(initial=math.inf) > away[behind].min() + SAME:
+                near = behind
         candidates = np.flatnonzero(near)
         nearest = float(away[candidates].min())
         limit = nearest + SAME if self._last is None else nearest
@@ -61,7 +69,7 @@ class RouteProgress:
         if self._last is None:  # the nearest point of the first pass near the actor
             part = candidates[(candidates >= index) & (along[candidates] <= along[index] + BEHIND)]
             index = int(part[np.argmin(away[part])])
-        self._last = float(along[index])
+        self._last, self._position = float(along[index]), (x, y)
         return Place(self._last, float(away[index]))
 
     def forget(self) -> None:

@@ -107,6 +107,21 @@ def test_margin_of_completion_is_1_at_the_end(
     assert criterion.metrics().get("route_completion.margin") == (None if margin is None else pytest.approx(margin))
 
 
+@pytest.mark.parametrize("length", [10.0, 500.0])
+@pytest.mark.parametrize(("start", "step"), [(0.0, 40.0), (0.0, 31.0), (400.0, -12.5)])
+def test_steps_longer_than_the_searched_part_of_the_route(
+    frame: Any, car: Any, start: float, step: float, length: float
+) -> None:
+    """Ten steps along a route of straight lines of a length, in both directions."""
+    frames = drive(frame, car, *((start + step * n, 0.0) for n in range(11)), speed=abs(step))
+    route = [(x, 0.0) for x in np.arange(0.0, 500.0 + length, length).tolist()]
+    assert in_route(frames, route=route).value == 0.0
+    criterion = RouteCompletion(RouteCompletionSettings(of="Ego", route=tuple(route)))
+    judge(criterion, frames)
+    assert criterion.route is not None
+    assert criterion.route.place(start + 10.0 * step, 0.0).along == start + 10.0 * step
+
+
 def test_route_there_and_back(frame: Any, car: Any) -> None:
     route = [(0.0, 0.0), (60.0, 0.0), (0.0, 0.0)]
     there = [(0.0, 0.0), (20.0, 0.0), (40.0, 0.0), (60.0, 0.0)]
