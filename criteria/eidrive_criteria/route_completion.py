@@ -12,6 +12,12 @@ from eidrive_criteria.routed import RouteCriterion, RouteSettings
 from eidrive_scenario.api.common import EPSILON
 from eidrive_scenario.api.criteria import Place, Verdict
 
+START = 10.0
+"""Distance from the start of the route up to which a part that begins there counts from the start [m]: routes begin at
+the reference point of the actor, or a few meters beside its body."""
+AWAY = 30.0
+"""Distance from the route above which the actor completes nothing [m], as the default of `in_route`."""
+
 
 class RouteCompletionSettings(RouteSettings):
     """Settings: `{of: Ego, at_least: 0.99, within: 10}` with a share, and the distance within [m] that may be left."""
@@ -23,7 +29,8 @@ class RouteCompletionSettings(RouteSettings):
 class RouteCompletion(RouteCriterion):
     """Criterion that fails if the actor completes less than a share `at_least` of its route.
 
-    The completed distance is that of the farthest place on the route; a teleport completes nothing.
+    The completed distance is that from the place where the actor joins the route to the farthest one, or from the start
+    of the route if it joins it up to 10 m after. Teleports and ways farther than 30 m from the route complete nothing.
     """
 
     settings_type = RouteCompletionSettings
@@ -34,18 +41,23 @@ class RouteCompletion(RouteCriterion):
         self._settings = settings
         self.demands_progress = settings.at_least > 0.0 or settings.within is not None
         self._parts: list[tuple[float, float]] = []
-        """Begin and end of each completed part of the route [m]; a teleport begins another one."""
+        """Begin and end of each completed part of the route [m]; another one begins where the actor joins again."""
+        self._was_away = False
 
     def begin(self) -> None:
         self._parts = []
 
     def locate(self, time: float, place: Place, driven: float | None) -> None:
-        if not self._parts:
-            self._parts.append((0.0, place.along))
-        elif driven is None:
-            self._parts.append((place.along, place.along))
-        elif place.along > self._parts[-1][1]:
-            self._parts[-1] = self._parts[-1][0], place.along
+        is_away = place.away > AWAY
+        if self._parts and driven is not None and not is_away and not self._was_away:
+            begin, end = self._parts[-1]
+            self._parts[-1] = begin, max(end, place.along)
+        else:
+            if self._parts and self._was_away:
+                self._parts.pop()  # it has no length
+            begin = 0.0 if place.along <= START and not is_away else place.along
+            self._parts.append((begin, place.along))
+        self._was_away = is_away
 
     def _share(self) -> float | None:
         if self.route is None or not self._parts:

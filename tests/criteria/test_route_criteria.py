@@ -107,6 +107,27 @@ def test_margin_of_completion_is_1_at_the_end(
     assert criterion.metrics().get("route_completion.margin") == (None if margin is None else pytest.approx(margin))
 
 
+@pytest.mark.parametrize(
+    ("points", "share"),
+    [
+        ([(60, 0), (80, 0), (100, 0)], 0.4),
+        ([(10, 5), (30, 0), (50, 0)], 0.5),
+        ([(-15, 0), (5, 0), (25, 0)], 0.25),
+        ([(100, 0), (100, 0)], 0.0),
+        ([(100, 500), (100, 500)], 0.0),
+        ([(0, 31), (20, 31), (40, 31)], 0.0),
+        ([(0, 29), (20, 29), (40, 29)], 0.4),
+        ([(0, 0), (20, 0), (20, 31), (40, 31), (60, 31), (60, 0), (80, 0)], 0.4),
+        ([(0, 500), (20, 31), (20, 0), (40, 0)], 0.2),
+    ],
+)
+def test_completion_begins_where_the_actor_joins_the_route(
+    frame: Any, car: Any, points: list[Point], share: float
+) -> None:
+    """The route of 100 m counts from its start up to 10 m after it, and places up to 30 m beside it count."""
+    assert completion(drive(frame, car, *points), route=STRAIGHT).value == pytest.approx(share)
+
+
 @pytest.mark.parametrize("length", [10.0, 500.0])
 @pytest.mark.parametrize(("start", "step"), [(0.0, 40.0), (0.0, 31.0), (400.0, -12.5)])
 def test_steps_longer_than_the_searched_part_of_the_route(
