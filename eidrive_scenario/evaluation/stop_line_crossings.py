@@ -17,7 +17,7 @@ from eidrive_scenario.roads import OTHER_LEVEL, RoadNetwork
 from eidrive_scenario.sensing.signals import Kind
 
 NEAR = 30.0
-"""Distance from a point within which stop lines are considered [m]."""
+"""Distance from a point within which stop lines are considered [m]; a step extends it by its length."""
 PAST = 10.0
 """Distance driven beyond the point on a route with a signal after which another route has been chosen [m]."""
 
@@ -87,7 +87,7 @@ class StopLineCrossings:
         heading, z   of the actor [rad], and its height [m], which selects among lines above each other
         """
         crossings = self._decide(before, now)
-        for line in self.near(now, z=z):
+        for line in self.near(now, NEAR + math.dist(before, now), z):
             if not crosses(line, before, now, heading):
                 continue
             if line.beyond is None:

@@ -84,6 +84,15 @@ def test_red_light_is_judged_at_the_stop_line(
     assert criterion.metrics()["running_red_light.count"] == float(time is not None)
 
 
+@pytest.mark.parametrize("after", [1.0, 29.0, 35.9])
+def test_red_light_is_judged_in_steps_longer_than_the_searched_area(frame: Any, car: Any, after: float) -> None:
+    """Steps of 36 m; in the third frame the front, 2 m ahead of the center, is at a distance after the line."""
+    positions = enumerate(LINE + after - 2.0 + 36.0 * step for step in (-2, -1, 0, 1))
+    frames = [frame(float(n), {"Ego": car(x, speed=36.0)}, signals={"10": "red"}) for n, x in positions]
+    verdict = judge(light(), frames, lights())
+    assert (verdict.passed, verdict.value, verdict.first_violation) == (False, 1.0, 2.0)
+
+
 @pytest.mark.parametrize("y", [3.5, -3.5], ids=["oncoming lane", "parking lane"])
 def test_red_light_of_another_lane_is_no_violation(frame: Any, car: Any, y: float) -> None:
     assert judge(light(), driving(frame, car, ["red"] * 12, y=y), lights()).passed
