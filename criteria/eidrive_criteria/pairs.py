@@ -142,6 +142,8 @@ class LeaderCriterion(SurroundedCriterion):
         self._extreme = Extreme(limit, largest=self.largest)
         self._leader = self._other = ""
         """Leader in the last frame, and that of the extreme."""
+        self._was_led = False
+        """Whether there was a leader so far."""
 
     @abstractmethod
     def measure(self, leader: Relation) -> float | None:
@@ -152,6 +154,7 @@ class LeaderCriterion(SurroundedCriterion):
         if self.missing:
             self.missing.difference_update(view.names)
         leader = self.surroundings.leader(view, self.of, self.others)
+        self._was_led = self._was_led or leader is not None
         value, other = (self.measure(leader), leader.other) if leader is not None else (None, "")
         if self.in_contact is not None:
             # Bodies with a contact within the step may be apart, and beside each other, at its end.
@@ -169,6 +172,8 @@ class LeaderCriterion(SurroundedCriterion):
     def verdict(self) -> Verdict:
         if self.missing:
             reason = actor_never_present(self.missing)
+        elif self._extreme.value is None and self._was_led:
+            reason = f"the {self.quantity} of {self.of} to {self._target} ahead in its path was never defined"
         elif self._extreme.value is None:
             reason = f"{self.of} never had {self._target} ahead in its path, so there is no {self.quantity}"
         else:

@@ -20,7 +20,7 @@ class TimeHeadwaySettings(LeaderSettings):
 class TimeHeadway(LeaderCriterion):
     """Criterion that fails if the time headway falls below `at_least`: gap between the bodies over the own speed.
 
-    A standing actor has no time headway.
+    A standing or reversing actor has no time headway.
     """
 
     settings_type = TimeHeadwaySettings

@@ -118,9 +118,11 @@ def test_contact_with_the_follower_needs_no_deceleration(frame: Any, car: Any) -
     assert judge(deceleration(), [frame(0.0, cars, contacts=[contact])]).value == 0.0
 
 
-def test_standing_actor_has_no_headway(frame: Any, car: Any) -> None:
-    verdict = judge(headway(at_least=2.0), [frame(0.0, {"Ego": car(0), "Lead": car(5)})])
+@pytest.mark.parametrize("speed", [0.0, -5.0])
+def test_standing_and_reversing_actors_have_no_headway(frame: Any, car: Any, speed: float) -> None:
+    verdict = judge(headway(at_least=2.0), [frame(0.0, {"Ego": car(0, speed=speed), "Lead": car(5)})])
     assert (verdict.passed, verdict.value) == (True, None)
+    assert verdict.reason == "the time headway of Ego to an actor ahead in its path was never defined"
 
 
 @pytest.mark.parametrize("criterion", [headway, deceleration])
