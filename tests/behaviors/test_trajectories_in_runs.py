@@ -116,8 +116,19 @@ def test_timed_trajectory_with_opposite_headings_has_negative_speed(run: Run) ->
     timed = curve(world(200.0, -2.0, 0.0), world(180.0, -2.0, 0.0), times=(0.0, 2.0))
     reference = '<Timing domainAbsoluteRelative="relative" scale="1" offset="0"/>'
     played = drive(run, follow(timed, reference=reference), end=4.0)
+    assert row(played, 0.0) == pytest.approx((200.0, -2.0, 0.0, -10.0))
     assert row(played, 1.0) == pytest.approx((190.0, -2.0, 0.0, -10.0), abs=1e-6)
     assert row(played, 3.0) == pytest.approx((170.0, -2.0, 0.0, -10.0), abs=1e-6)
+
+
+@pytest.mark.element("FollowTrajectoryAction", "Timing")
+@pytest.mark.parametrize(("first", "offset", "speed"), [(0.0, 0, 5.0), (0.0, 1, 0.0), (-1.0, 0, 1.25)])
+def test_timed_trajectory_in_init_begins_with_its_speed(run: Run, first: float, offset: int, speed: float) -> None:
+    """10 m in 1 s, then 5 m in 2 s, with doubled times: 5 m/s, 1.25 m/s, and 0 before the time of the first point."""
+    timed = curve(world(200.0, -2.0), world(210.0, -2.0), world(215.0, -2.0), times=(first, first + 1.0, first + 3.0))
+    reference = f'<Timing domainAbsoluteRelative="absolute" scale="2" offset="{offset}"/>'
+    view = drive(run, follow(timed, reference=reference), end=0.1).frames[0].view
+    assert view.speed[view.row("Ego")] == pytest.approx(speed)
 
 
 def together(target: str, final: str, master: str = '<LanePosition roadId="1" laneId="-1" s="146"/>') -> str:

@@ -292,8 +292,13 @@ class FollowTrajectoryAction(ActionBehaviour):
             clock = self._clock(dt)
             after = self._timed_place(clock)
             done = clock >= layout.end_time - EPSILON
-            if dt > 0.0 and not (done and clock > layout.end_time + EPSILON):
-                motion.set_speed(self._forwards(after) * (after - self._s) / dt)
+            if dt == 0.0 and not done and self._speeds is None:
+                motion.set_speed(self._forwards(after) * layout.speed_at(clock) / self._timing.scale)
+            elif dt > 0.0 and not (done and clock > layout.end_time + EPSILON):
+                # The step of an actor that enters is no motion: its speed is that of the next one.
+                enters = not done and (motion.teleported or not actor.present)
+                start, end = (after, self._timed_place(self._clock(2.0 * dt))) if enters else (self._s, after)
+                motion.set_speed(self._forwards(after) * (end - start) / dt)
             if done:
                 after += self._overrun(clock) * self._timing.scale * abs(motion.speed)
         before, self._s = self._s, after

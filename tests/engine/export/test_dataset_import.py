@@ -157,6 +157,7 @@ def test_recording_of_carla_is_mirrored_and_vehicles_enter_and_leave(tmp_path: P
         assert views[tick].yaw[views[tick].row("Station214")] == pytest.approx(-math.pi / 2)
     for tick in (2, 3, 4, 5, 6):
         assert center_of(views[tick], "Vehicle7") == pytest.approx((20.0 + tick / 2, 4.0, 0.8), abs=1e-6)
+        assert views[tick].speed[views[tick].row("Vehicle7")] == pytest.approx(-10.0, abs=1e-4)  # tail first
     assert max(views) == 10
 
 
