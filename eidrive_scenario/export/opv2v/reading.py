@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
@@ -33,7 +33,7 @@ MAX_FRAMES = 100_000
 """Maximum number of frames of all stations of a scenario."""
 MAX_SHIFT = 0.1
 """Motion of the lidar of a roadside unit that counts as standing [m]."""
-_STATION = re.compile(r"-?\d{1,9}", re.ASCII)
+_STATION = re.compile(r"(-?\d{1,9})", re.ASCII)
 _FRAME = re.compile(r"(\d{1,9})\.yaml", re.ASCII)
 _EXPONENT = re.compile(r"[-+]?\d+(\.\d*)?[eE][-+]?\d{1,3}", re.ASCII)
 """Number such as 1e-05 or 1.5e3, which is text in YAML 1.1 and a number for readers of OPV2V."""
@@ -47,9 +47,9 @@ def scenario_folders(folder: Path) -> list[Path]:
     return sorted(path for path in folder.iterdir() if path.is_dir() and _stations(path))
 
 
-def _stations(folder: Path) -> list[Path]:
+def _stations(folder: Path) -> dict[int, Path]:
     """Return the folders of the stations of a scenario with frames, ordered by id."""
-    return sorted(filter(_frames, _numbered_folders(folder)), key=lambda path: int(path.name))
+    return _by_number(filter(_frames, _numbered_folders(folder)), _STATION)
 
 
 def _numbered_folders(folder: Path) -> list[Path]:
@@ -58,7 +58,18 @@ def _numbered_folders(folder: Path) -> list[Path]:
 
 def _frames(station: Path) -> dict[int, Path]:
     """Return the files of the frames of a station by number."""
-    numbered = {int(match[1]): path for path in station.iterdir() if (match := _FRAME.fullmatch(path.name))}
+    return _by_number(station.iterdir(), _FRAME)
+
+
+def _by_number(paths: Iterable[Path], pattern: re.Pattern[str]) -> dict[int, Path]:
+    """Return the paths with such a name, ordered by number. Raise SettingError if two of them have the same number."""
+    numbered: dict[int, Path] = {}
+    for path in sorted(paths):
+        if match := pattern.fullmatch(path.name):
+            other = numbered.setdefault(int(match[1]), path)
+            if other is not path:
+                message = f"{path.name} has the number of {other.name}"
+                raise SettingError(Diagnostic(message, "rename or remove one of them", str(path)))
     return dict(sorted(numbered.items()))
 
 
@@ -122,10 +133,14 @@ def _number(value: Any) -> Any:
 
 @dataclass
 class _Samples:
-    """Samples of a road user by frame number: pose (4, 4) of the center of its box; size and category of the first."""
+    """Samples of a road user by frame number: pose (4, 4) of the center of its box; size and category of the first.
+
+    key  key of the list of its id
+    """
 
     category: str
     size: tuple[float, float, float]
+    key: str = "vehicles"
     poses: dict[int, Array] = field(default_factory=dict)
 
 
@@ -144,7 +159,8 @@ def read_scene(folder: Path) -> TrafficScene:
     The box of a station is that of other stations, of `ego_extent`, or that of a usual car. Its pose is
     `true_ego_pos`, or follows from its lidar. Raise SettingError for damaged files.
     """
-    files = {int(path.name): _frames(path) for path in _stations(folder)}
+    folders = _stations(folder)
+    files = {number: _frames(path) for number, path in folders.items()}
     if sum(map(len, files.values())) > MAX_FRAMES:
         raise SettingError(Diagnostic(f"more than {MAX_FRAMES} frames", "give parts of the folder", str(folder)))
     numbers = sorted({number for frames in files.values() for number in frames})
@@ -165,7 +181,7 @@ def read_scene(folder: Path) -> TrafficScene:
                 _read_objects(file, key, number, objects)
     mobile = {number: station for number, station in stations.items() if number >= 0}
     warnings = [text for number, station in mobile.items() for text in _add_station(number, station, objects)]
-    empty = sorted(path.name for path in _numbered_folders(folder) if int(path.name) not in stations)
+    empty = sorted(path.name for path in _numbered_folders(folder) if path not in folders.values())
     warnings += [
         f"roadside unit {number} moves by up to {moved:.1f} m, but stays at its first pose in the scenario"
         for number, station in stations.items()
@@ -204,7 +220,9 @@ def _read_objects(file: _FrameFile, key: str, frame: int, objects: dict[int, _Sa
     for number, content, path in file.objects(key):
         size = file.size(content, "extent", path)
         category = content.get("obj_type", "pedestrian" if key == "pedestrians" else "")
-        samples = objects.setdefault(number, _Samples(category if category in CLASSES else "", size))
+        samples = objects.setdefault(number, _Samples(category if category in CLASSES else "", size, key))
+        if samples.key != key:
+            file.fail(path, f"{path} has the id of an object in {samples.key}")
         location, center = (file.numbers(content, name, 3, path) for name in ("location", "center"))
         angle = file.numbers(content, "angle", 3, path)
         # The offset of the center is along the axes of the map, as readers of OPV2V add it.

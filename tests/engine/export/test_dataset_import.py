@@ -241,6 +241,30 @@ def test_damaged_frame_is_an_error_with_file_and_line(content: str, message: str
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (["641/000000", "0641/000002"], r"scene/641: 641 has the number of 0641; rename or remove one of them$"),
+        (["641/000002", "641/002"], r"scene/641/002\.yaml: 002\.yaml has the number of 000002\.yaml; rename"),
+    ],
+)
+def test_two_folders_or_frames_of_one_number_are_an_error(names: list[str], message: str, tmp_path: Path) -> None:
+    for name in names:
+        path = tmp_path / "scene" / f"{name}.yaml"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(yaml.safe_dump(frame(0.0)))
+    with pytest.raises(SettingError, match=message):
+        list(import_recordings(tmp_path / "scene", tmp_path / "out"))
+
+
+def test_vehicle_and_pedestrian_of_one_id_are_an_error(tmp_path: Path) -> None:
+    """Ids of CARLA are unique over all actors: also those of different frames are of one road user."""
+    write_frame(tmp_path / "scene", 1, 0, frame(0.0, v7=vehicle(20.0, 0.0)))
+    write_frame(tmp_path / "scene", 1, 2, frame(0.0) | {"pedestrians": {7: vehicle(30.0, 5.0)}})
+    with pytest.raises(SettingError, match=r"000002\.yaml:9: pedestrians\.7 has the id of an object in vehicles"):
+        list(import_recordings(tmp_path / "scene", tmp_path / "out"))
+
+
 def test_frame_that_is_no_regular_file_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "scene" / "1").mkdir(parents=True)
     os.mkfifo(tmp_path / "scene" / "1" / "000000.yaml")
