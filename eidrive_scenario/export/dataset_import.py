@@ -10,7 +10,7 @@ from eidrive_scenario.export.opv2v.reading import read_scene, scenario_folders
 from eidrive_scenario.export.opv2v.writer import OPV2V_LIDAR, RATE
 from eidrive_scenario.export.traffic_recording.dair_v2x import is_dair_v2x, read_scenes
 from eidrive_scenario.export.traffic_recording.scenario_file import scenario_text
-from eidrive_scenario.export.traffic_recording.scene import TrafficScene, at_ground
+from eidrive_scenario.export.traffic_recording.scene import TrafficScene, at_ground, roll_warnings
 from eidrive_scenario.extensions.library import SCENARIO_SUFFIX
 from eidrive_scenario.files.atomic import write_atomically
 
@@ -27,7 +27,7 @@ def import_recordings(folder: Path, out: Path) -> Iterator[tuple[Path, list[str]
         lidar = {**OPV2V_LIDAR.model_dump(exclude_unset=True), "rate": RATE}
         with write_atomically(path) as stream:
             stream.write(scenario_text(level, lidar))
-        yield path, level.warnings
+        yield path, [*level.warnings, *roll_warnings(level)]
 
 
 def _scenes(folder: Path) -> Iterator[TrafficScene]:

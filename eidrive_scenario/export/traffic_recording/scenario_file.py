@@ -126,7 +126,7 @@ def scenario_text(scene: TrafficScene, lidar: dict[str, object]) -> bytes:
         entity.append(actor.element)
         station = stations.get(track.name)
         if station is not None:
-            yaw, pitch, _ = angles(station.lidar[:3, :3])
+            yaw, pitch, _ = angles(station.lidar[:3, :3])  # a mount has no roll: `roll_warnings`
             _add_stack(entity, track.name, _mount(station.lidar[:3, 3] + actor.center, yaw, pitch), lidar)
         _add_motion(start, act, actor, scene.end, is_station=station is not None)
     for unit in scene.roadside:
@@ -237,16 +237,17 @@ def _position(parent: etree._Element, pose: Array) -> None:
 
 
 def _add_mast(entities: etree._Element, start: etree._Element, unit: LidarStation, lidar: dict[str, object]) -> None:
-    """Add the mast of a roadside unit, with its lidar on the top."""
-    yaw, pitch, _ = angles(unit.lidar[:3, :3])
-    x, y, height = unit.lidar[:3, 3].tolist()
+    """Add the mast of a roadside unit, with its lidar on the top. The mast has the yaw and the roll of the lidar."""
+    _, pitch, _ = angles(unit.lidar[:3, :3])
+    height = float(unit.lidar[2, 3])
+    mount = rigid_transform(rotation_matrix(0.0, pitch), (0.0, 0.0, height))
     entity = _add(entities, "ScenarioObject", name=unit.name)
     reference = _add(entity, "CatalogReference", catalogName="misc_objects", entryName="rsu")
     mast = max(height, MAST_BASE)
     assignments = _add(reference, "ParameterAssignments")
     _add(assignments, "ParameterAssignment", parameterRef="Height", value=repr(mast))
     _add_stack(entity, unit.name, _mount((0.0, 0.0, height), 0.0, pitch), lidar)
-    _add_teleport(_add(start, "Private", entityRef=unit.name), rigid_transform(rotation_matrix(yaw), (x, y, 0.0)))
+    _add_teleport(_add(start, "Private", entityRef=unit.name), unit.lidar @ np.linalg.inv(mount))
 
 
 def _trigger(tag: str, name: str, time: float) -> etree._Element:

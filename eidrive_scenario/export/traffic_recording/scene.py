@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.export.geometry import angles
 
 STATION_SIZE = (4.9, 2.06, 1.5)
 """Length, width and height of a vehicle with a lidar whose box no file states: a Lincoln MKZ, as in OPV2V [m]."""
@@ -17,6 +20,10 @@ LIDAR_HEIGHT = 1.9
 MAX_NUMBER = 1e9
 """Maximum absolute value of a number in a file."""
 OUT_OF_RANGE = f"has a number that is out of range (expected -{MAX_NUMBER:g} to {MAX_NUMBER:g})"
+
+
+MAX_ROLL = 0.5
+"""Roll of the lidar of a vehicle relative to its box that counts as none [degrees]."""
 
 
 def folder_name(folder: Path) -> str:
@@ -74,6 +81,14 @@ class TrafficScene:
     mobile: list[LidarStation]
     roadside: list[LidarStation]
     warnings: list[str] = field(default_factory=list)
+
+
+def roll_warnings(scene: TrafficScene) -> Iterator[str]:
+    """Yield a warning for each vehicle whose lidar has a roll, which the mount of a sensor has not."""
+    for station in scene.mobile:
+        roll = math.degrees(angles(station.lidar[:3, :3])[2])
+        if abs(roll) > MAX_ROLL:
+            yield f"the lidar of {station.name} has no roll: mounts have none (recorded: {roll:.1f} degrees)"
 
 
 GROUND_TOLERANCE = 0.5

@@ -192,6 +192,22 @@ def test_current_folder_has_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert imported(Path(".."), tmp_path)[0] == tmp_path / "scene.xosc"
 
 
+def test_roadside_lidar_keeps_its_roll_and_that_of_a_vehicle_warns(tmp_path: Path) -> None:
+    """The lidar of a roadside unit at 5 m: roll 10, yaw 30 and pitch -20 degrees of the left-handed world of OPV2V."""
+    for number in (0, 2):
+        write_frame(tmp_path / "in", 5, number, frame(0.0) | {"lidar_pose": [0.0, 5.0, 1.9, 8.0, 90.0, 0.0]})
+        write_frame(tmp_path / "in", -1, number, frame(0.0) | {"lidar_pose": [10.0, 5.0, 5.0, 10.0, 30.0, -20.0]})
+    path, warnings = imported(tmp_path / "in", tmp_path)
+    assert "the lidar of Station5 has no roll: mounts have none (recorded: 8.0 degrees)" in warnings
+    assert sum("roll" in text for text in warnings) == 1
+    with Simulation(with_small_lidar(path)) as simulation:
+        simulation.tick()
+        lidar: LidarReading = simulation.stack.readings["RoadsideUnit1"].lidars["lidar"]
+    expected = rotation_matrix(math.radians(-30.0), math.radians(20.0), math.radians(10.0))
+    np.testing.assert_allclose(lidar.pose[:3, :3], expected, atol=1e-6)
+    np.testing.assert_allclose(lidar.pose[:3, 3], (10.0, -5.0, 5.0), atol=1e-6)
+
+
 def test_heights_of_a_recording_are_those_above_its_lowest_road_user(tmp_path: Path) -> None:
     for number in (0, 2):
         low, high = vehicle(30.0, 0.0, location=[30.0, 0.0, 200.0]), vehicle(60.0, 0.0, location=[60.0, 0.0, 203.0])
