@@ -55,12 +55,14 @@ class _ReceivedMap:
     """Cells of the newest map of a station that have arrived.
 
     interval  time between the two scans in the features [s]; 0: they are of one scan and show no motion
+    foot      height of the ground below the lidar in the world [m]
     latent (n, m, 8), present (n, m) whether the features of a cell have arrived
     """
 
     sequence: int
     time: float
     interval: float
+    foot: float
     grid: Grid
     latent: Floats
     present: Bools
@@ -173,7 +175,7 @@ class IntermediateFusion(CovarianceIntersectionFusion):
                 return
             values, present = np.zeros((*grid.shape, len(latent)), np.float32), np.zeros(grid.shape, np.bool_)
             held = self._received[sender] = _ReceivedMap(
-                payload.sequence, payload.time, payload.interval, grid, values, present
+                payload.sequence, payload.time, payload.interval, payload.foot, grid, values, present
             )
         cells = np.stack(np.unravel_index(payload.indices, grid.shape), axis=-1)
         length, width = body[3] + grid.cell, body[4] + grid.cell  # all cells that overlap with the body
@@ -213,9 +215,9 @@ class IntermediateFusion(CovarianceIntersectionFusion):
                 omitted[of_station] = self._covered(self._merged[station], self._history.positions(rows[of_station]))
         return omitted
 
-    def _alignment(self, report: Report | None) -> PoseAlignment | None:
+    def _alignment(self, report: Report) -> PoseAlignment | None:
         """Return the pose of a sender, aligned to the objects in the own features; None if the pose is not aligned."""
-        if not self.settings.align_poses or self._alone is None or report is None or report.state is None:
+        if not self.settings.align_poses or self._alone is None or report.state is None:
             return None
         return align_pose(self._alone, report)
 
@@ -266,19 +268,41 @@ class IntermediateFusion(CovarianceIntersectionFusion):
                 for time, x, y, yaw, length, width, vx, vy in self._boxes.get(sender, {}).values()
                 if abs(held.time - time) <= self.settings.max_age
             ]).reshape(-1, 7)  # fmt: skip
-            grid, age = self._grid_for(sender, self._grid), features.time - held.time
+            grid, age = self._grid_for(self._reports.get(sender), held, readings), features.time - held.time
             latent, present[station] = warp(held.latent, held.present, held.grid, grid, moving, age)
-            expanded = self._codec.expand(np.ascontiguousarray(latent[present[station]].T))
-            scatter(expanded, present[station], received[station])
+            self._expand(latent, present[station], received[station])
         fused = self.fuse_maps(features.features, received, present)
         check_array(self, "fuse_maps", "features", fused, features.features.shape)
         # Features of one scan contain an arbitrary motion, so that no velocity in the fused ones is known.
         interval = features.interval if all(held.interval for held in self._received.values()) else None
         return replace(readings, features=replace(features, features=fused, interval=interval))
 
-    def _grid_for(self, sender: str, grid: Grid) -> Grid:
-        """Return the own grid relative to the pose that a sender states, from which objects of both may differ."""
-        alignment = self._alignment(self._reports.get(sender))
+    def _expand(self, latent: Floats, present: Bools, features: Floats) -> None:
+        """Set the features (C, n, m) of the present cells from compressed ones (n, m, 8)."""
+        scatter(self._codec.expand(np.ascontiguousarray(latent[present].T)), present, features)
+
+    def _grid_for(self, report: Report | None, held: _ReceivedMap, readings: Readings) -> Grid:
+        """Return the own grid relative to the pose that a sender states, from which objects of both may differ.
+
+        These are the objects in its map. The boxes of a CPM have the pose error of their time, not that of the map, and
+        a tracker has removed a part of it.
+        """
+        detector, features = self._detector, readings.features
+        assert detector is not None
+        assert features is not None
+        grid = Grid.of(features)
+        state = None if report is None or not self.settings.align_poses else report.state
+        if report is None or state is None or state.pose_covariance is None or held.grid.shape != grid.shape:
+            return grid
+        theirs = np.zeros_like(features.features)
+        self._expand(held.latent, held.present, theirs)
+        sender = held.grid
+        shared = replace(
+            features, time=held.time, x=sender.x, y=sender.y, yaw=sender.yaw, foot=held.foot, cell=sender.cell,
+            features=theirs, interval=held.interval or None,
+        )  # fmt: skip
+        objects = detector.detect(replace(readings, time=held.time, features=shared))
+        alignment = self._alignment(replace(report, detections=objects))
         if alignment is None:
             return grid
         x, y, _ = alignment.pose

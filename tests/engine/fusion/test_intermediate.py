@@ -176,11 +176,11 @@ COMMON = ((20.0, 4.0), (12.0, -9.0), (-15.0, -8.0), (25.0, 16.0))
 """Objects that both stations see."""
 
 
-def displaced(time: float, hidden: tuple[float, float], **more: Any) -> list[Message]:
-    """Return the messages of a station that is 1.6 m off, states that, and sees another object."""
-    points = [(x + 1.6, y) for x, y in (*COMMON, hidden)]
+def displaced(time: float, hidden: tuple[float, float], error: float = 1.6, **more: Any) -> list[Message]:
+    """Return the messages of a station with an error of x [m], which it states, that sees another object."""
+    points = [(x + error, y) for x, y in (*COMMON, hidden)]
     covariance = np.diag([0.64, 0.64, math.radians(0.4) ** 2])
-    messages = sent(MASTS[0], time, *points, at=(THERE[0] + 1.6, *THERE[1:]), **more)
+    messages = sent(MASTS[0], time, *points, at=(THERE[0] + error, *THERE[1:]), **more)
     return [replace(message, state=replace(message.state, pose_covariance=covariance)) for message in messages]
 
 
@@ -194,6 +194,19 @@ def test_shared_boxes_correct_the_pose_of_the_sender() -> None:
         centers = step.fused.boxes[:, :2]
         alone = centers[np.hypot(centers[:, 0] - x, centers[:, 1] + 4.0) < 3.0]
         assert abs(alone.mean(axis=0)[0] - x) < 0.6, align_poses
+
+
+@pytest.mark.parametrize("later", [1.6, 0.0, -1.6])
+def test_objects_in_features_correct_their_place_whatever_later_boxes_show(later: float) -> None:
+    """As above, with a pose error of 1.6 m in the features, and another in the boxes of the next time step."""
+    stated = displaced(0.0, (30.0, -4.0), fusion="where2comm")
+    boxes = displaced(0.05, (30.0, -4.0), later, fusion="where2comm")[:1]
+    ego = agent(EGO, fusion_settings={"align_poses": True})
+    ego.act(readings(0.05, HERE, *COMMON), received(stated, 0.05), 0.05, None)
+    ego.act(readings(0.1, HERE, *COMMON), received(boxes, 0.1), 0.1, None)
+    centers = next(report for report in ego.reports if report.station == "Ego").detections.boxes[:, :2]
+    alone = centers[np.hypot(centers[:, 0] - 30.0, centers[:, 1] + 4.0) < 3.0]
+    assert abs(alone.mean(axis=0)[0] - 30.0) < 0.6
 
 
 def test_shared_boxes_with_features_correct_boxes_without() -> None:
