@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Self
 
 import msgspec
 import numpy as np
@@ -77,6 +78,13 @@ class Detections(msgspec.Struct, frozen=True, gc=False):
 
     def __len__(self) -> int:
         return len(self.boxes)
+
+    def freeze(self) -> Self:
+        """Make the arrays read-only, as several stations, messages and observers share them; return the detections."""
+        arrays = self.boxes, self.scores, self.velocity, self.covariance, self.existence, self.velocity_variance
+        for array in arrays:
+            array.setflags(write=False)
+        return self
 
     @classmethod
     def concatenate(cls, time: float, parts: Sequence[Detections]) -> Detections:

@@ -20,7 +20,7 @@ from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import OWN_DECISIONS, AgentStep, Plan, StationAction, StationPerception
 from eidrive_scenario.fusion.method import FusionMethod, Report
 from eidrive_scenario.perception.pipeline import Perception
-from eidrive_scenario.perception.result_checks import check_detections, is_checked
+from eidrive_scenario.perception.result_checks import checked_detections, is_checked
 from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.sensing.settings import MIN_ROTATION
 from eidrive_scenario.v2x.messages.message import ReceivedMessage, StationState
@@ -177,8 +177,8 @@ class Agent:
     def with_fused(self, sensed: StationPerception, fused: Detections) -> StationPerception:
         """Return what the station perceives with the objects after fusion. Raise InvalidResult if they are invalid."""
         if self._fusion_checked:
-            check_detections(self.fusion, "fuse", fused)
-        return replace(sensed, fused=fused)
+            fused = checked_detections(self.fusion, "fuse", fused)
+        return replace(sensed, fused=fused.freeze())
 
     def decide(self, perceived: StationPerception, action: StationAction = OWN_DECISIONS) -> AgentStep:
         """Return the step of the station from what it perceives in this tick.

@@ -18,7 +18,7 @@ from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.faults import FalseObject, PoseError, with_false_objects
 from eidrive_scenario.perception.localization import Localizer, PoseNoiseProcess, add_pose_error
-from eidrive_scenario.perception.result_checks import check_array, check_detections, describe, is_checked
+from eidrive_scenario.perception.result_checks import check_array, checked_detections, describe, is_checked
 from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.perception.tracking.motion_models import KNOWN_SPEED
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, PoseUncertainty
@@ -184,13 +184,14 @@ class Perception:
         if _has_all(readings, self.detector.needs):
             detections = self.detector.detect(readings)
             if self._checked:
-                check_detections(self.detector, "detect", detections, now=now)
+                detections = checked_detections(self.detector, "detect", detections, now=now)
             if len(readings.attached):
                 detections = without_rows(detections, rows_on_bodies(detections, outlines(readings.attached)))
             if self._false_objects:
                 detections = with_false_objects(
                     detections, self._false_objects, with_velocity=self.detector.provides_velocity
                 )
+            detections.freeze()
             if self._latency <= 0.0 and not self._computing:
                 return self._track(detections, readings)
             self._computing.append((now + self._latency, detections, readings))
@@ -201,7 +202,7 @@ class Perception:
         if newest is None and self._tracker is not None:
             newest = self._tracker.predict(now - self._latency)
             if newest is not None:
-                check_detections(self._tracker, "predict", newest, now=now)
+                newest = checked_detections(self._tracker, "predict", newest, now=now)
         return newest
 
     def _track(self, detections: Detections, readings: Readings) -> Detections:
@@ -217,8 +218,7 @@ class Perception:
             return shares
 
         tracked = self._tracker.update(detections, in_view)
-        check_detections(self._tracker, "update", tracked, now=readings.time)
-        return tracked
+        return checked_detections(self._tracker, "update", tracked, now=readings.time)
 
 
 def _has_all(readings: Readings, kinds: frozenset[str]) -> bool:

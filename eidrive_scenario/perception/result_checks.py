@@ -32,6 +32,15 @@ def is_checked(extension: object) -> bool:
     return not vars(type(extension)).get("is_finite_by_construction", False)
 
 
+def checked_detections(extension: object, method: str, result: Detections, *, now: float | None = None) -> Detections:
+    """Return a read-only copy of a result, into whose arrays the extension may write its next one.
+
+    Raise InvalidResult as `check_detections` does.
+    """
+    check_detections(extension, method, result, now=now)
+    return result.subset(range(len(result))).freeze()
+
+
 def check_detections(extension: object, method: str, detections: object, *, now: float | None = None) -> None:
     """Raise InvalidResult unless `detections` is a Detections of finite numbers in their ranges.
 

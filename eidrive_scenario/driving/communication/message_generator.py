@@ -211,7 +211,9 @@ class MessageGenerator:
         sensors, security = len(self._view) if lists_sensors else 0, self._settings.security_bytes
         size = cam_size(low_frequency) if kind == "cam" else cpm_size(len(detections), sensors, security)
         view = self._view if lists_sensors else None
-        message = Message(self._spec.name, self.number, now, state, detections, size, kind, objects, sensors=view)
+        message = Message(
+            self._spec.name, self.number, now, state, detections.freeze(), size, kind, objects, sensors=view
+        )
         self.number += 1
         if self._encoder is None:
             return message

@@ -304,8 +304,8 @@ class ReportStore:
             if objects is not None:  # the message lists a part of the objects of its sender
                 if sender not in self._partial:
                     self._partial[sender] = PartialReportAssembler(self._lifetime)
-                completed = self._partial[sender].update(objects, detections)
-            report = Report(station, detections, received.arrived, state, complete, pose_change, not perceived)
+                completed = self._partial[sender].update(objects, detections).freeze()
+            report = Report(station, detections.freeze(), received.arrived, state, complete, pose_change, not perceived)
             self.add(report, completed)
         if now > self._next_deletion:
             ends = {station: self._end_of_life(held) for station, held in self._reports.items()}

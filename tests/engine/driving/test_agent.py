@@ -85,6 +85,20 @@ def known(step: AgentStep) -> list[Place]:
     return sorted((round(x, 6), round(y, 6)) for x, y in step.fused.boxes[:, :2].tolist())
 
 
+@pytest.mark.parametrize("fusion", ["average", "covariance_intersection"])
+def test_arrays_of_fused_reported_and_sent_objects_are_read_only(fusion: str, car: ActorSpec) -> None:
+    """A planner or fusion method that computes in place would change the messages and the recording."""
+    cooperation = Cooperation(car, "{model: composed}", fusion=fusion)
+    for _ in range(2):
+        steps = cooperation.step({"Ego": (OPEN,), "RSU": (HIDDEN, (0.0, 0.0))})
+    ego = steps["Ego"]
+    reports = [report.detections for report in cooperation.agents["Ego"].reports]
+    assert len(reports) == 2
+    for detections in (ego.fused, ego.detections, *reports, *(message.detections for message in ego.outbox)):
+        for array in (detections.boxes, detections.scores, detections.velocity, detections.covariance):
+            assert not array.flags.writeable
+
+
 def test_ideal_channel_delivers_detections_of_others_in_next_tick(car: ActorSpec) -> None:
     cooperation = Cooperation(car, "{model: composed}")
     assert known(cooperation.step({"Ego": (OPEN,), "RSU": (HIDDEN,)})["Ego"]) == [OPEN]

@@ -52,6 +52,28 @@ def test_perceive_with_latency_delays_each_detection() -> None:
     assert result_times(Perception(OracleDetector(), latency=0.15), 7) == [None, None, None, 0.0, 0.05, 0.1, 0.15]
 
 
+class WithBuffer(OracleDetector):
+    """Detector that writes all results into one array."""
+
+    def __init__(self) -> None:
+        self.boxes = np.zeros((1, 7))
+
+    def detect(self, readings: Readings) -> Detections:
+        result = super().detect(readings)
+        self.boxes[:] = result.boxes
+        return replace(result, boxes=self.boxes)
+
+
+@pytest.mark.parametrize("latency", [0.0, DT])
+@pytest.mark.parametrize("detector", [OracleDetector, WithBuffer])
+def test_detections_keep_their_values_and_are_read_only(detector: type[Detector], latency: float) -> None:
+    perception = Perception(detector(), latency=latency)
+    results = [perception.perceive(readings(tick * DT, 5.0 * tick)) for tick in range(4)]
+    boxes = [result.boxes for result in results if result is not None]
+    assert [array[0, 0] for array in boxes] == [0.0, 5.0, 10.0, 15.0][: 3 if latency else 4]
+    assert not any(array.flags.writeable for array in boxes)
+
+
 def test_perceive_with_latency_between_ticks_returns_at_later_tick() -> None:
     assert result_times(Perception(OracleDetector(), latency=0.11), 6) == [None, None, None, 0.0, 0.05, 0.1]
 
