@@ -46,6 +46,8 @@ class Observers:
     def add(self, *observers: Observer) -> None:
         """Add observers of all frames from now on. Raise SettingError if one lacks a method."""
         for observer in observers:
+            if isinstance(observer, type):
+                raise SettingError(Diagnostic(f"observer {observer.__name__} is a class", "give an instance of it"))
             for method in ("observe", "close"):
                 if not callable(getattr(observer, method, None)):
                     message = f"observer {type(observer).__name__} has no method {method}"
