@@ -121,7 +121,9 @@ class Simulation:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is not None:  # an exception of close() would hide the one that ended the run
+            self._observers.close_silently()
         self.close()
 
     def add_observer(self, observer: Observer) -> None:
