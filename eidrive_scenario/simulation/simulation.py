@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Collection, Sequence
 from contextlib import ExitStack
-from types import FrameType
+from types import FrameType, MappingProxyType
 from typing import Self
 
 from msgspec.structs import replace
@@ -239,16 +239,16 @@ class Simulation:
         self._environment = commands.environment or self._environment
         frame = Frame(
             view,
-            steps,
+            MappingProxyType(steps),
             self.storyboard.changes,
             self._links,
             commands.signals,
-            commands.appearances,
+            MappingProxyType(commands.appearances),
             self._environment,
-            commands.monitors,
+            MappingProxyType(commands.monitors),
             commands.routes,
             self._state.take_executed(),
-            self._state.trailers_in(view),
+            MappingProxyType(self._state.trailers_in(view)),
         )
         self._measures.observe(frame, commands.driven)
         self._observers.observe(frame)

@@ -209,11 +209,15 @@ class WorldView(msgspec.Struct, frozen=True, dict=True):
     def boxes(self) -> Array:
         """Bounding boxes x y z l w h yaw (N, 7), center in the world frame [m, rad]."""
         if 0 < len(self.names) <= FEW:
-            return np.array(self.plain_boxes)
+            boxes = np.array(self.plain_boxes)
+            boxes.setflags(write=False)
+            return boxes
         cos, sin = np.cos(self.yaw), np.sin(self.yaw)
         x, y, z = self.offset.T
         centers = self.position + np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=1)
-        return np.concatenate([centers, self.size, self.yaw[:, None]], axis=1)
+        boxes = np.concatenate([centers, self.size, self.yaw[:, None]], axis=1)
+        boxes.setflags(write=False)
+        return boxes
 
 
 def _box(state: ActorState, offset: list[float], size: list[float]) -> tuple[float, ...]:

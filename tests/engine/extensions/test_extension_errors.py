@@ -5,13 +5,14 @@ from __future__ import annotations
 import pickle
 import re
 from pathlib import Path
+from types import MappingProxyType
 
 import pytest
 from faulty_extensions import line_of, write_scenario
 
 from eidrive_scenario.errors import ExtensionError, InputError, RegistryError
 from eidrive_scenario.recording.frame import Frame
-from eidrive_scenario.simulation import RunResult, RunSettings, run_file
+from eidrive_scenario.simulation import RunResult, RunSettings, Simulation, run_file
 
 
 def run(tmp_path: Path, *, detector: str = "oracle", channel: str = "ideal", **extensions: object) -> RunResult:
@@ -260,6 +261,25 @@ def test_exception_of_observer_names_its_class(package: Path, tmp_path: Path, ob
     with pytest.raises(ExtensionError, match=r"observer 'Watcher'.*(ValueError: no|SystemExit: 0)") as caught:
         run_file(write_scenario(tmp_path / "s.xosc"), observers=[observer])
     assert caught.value.place.file == __file__
+
+
+def test_exception_of_close_does_not_hide_the_one_of_the_run(package: Path, tmp_path: Path) -> None:
+    observer = Watcher(ValueError("of the run"), ValueError("of close"))
+    with pytest.raises(ExtensionError, match="of the run"):
+        run_file(write_scenario(tmp_path / "s.xosc"), observers=[observer])
+
+
+def test_observer_cannot_change_the_contents_of_frames(package: Path, tmp_path: Path) -> None:
+    with Simulation(write_scenario(tmp_path / "s.xosc")) as simulation:
+        frame, _ = simulation.tick()
+    for content in (frame.steps, frame.signals, frame.appearances, frame.monitors, frame.routes, frame.trailers):
+        assert isinstance(content, MappingProxyType)
+    assert not frame.view.boxes.flags.writeable
+
+
+def test_observer_that_is_a_class_is_refused(package: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="observer Watcher is a class"):
+        run_file(write_scenario(tmp_path / "s.xosc"), observers=[Watcher])  # type: ignore[list-item]
 
 
 def test_observer_without_close_is_refused(package: Path, tmp_path: Path) -> None:
