@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from functools import partial
 from numbers import Real
 from typing import Any
 
@@ -20,6 +22,7 @@ from eidrive_scenario.perception.detector import Detector, DetectorContext
 from eidrive_scenario.perception.lidar.station import StationLidars, turning_each_step
 from eidrive_scenario.perception.localization import Localizer, MotionNoise, PoseNoiseProcess
 from eidrive_scenario.perception.pipeline import Perception
+from eidrive_scenario.perception.result_checks import checked_range
 from eidrive_scenario.perception.tracking.method import NO_TRACKER, TrackerSettings, TrackingMethod
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.rig import Rig
@@ -129,7 +132,7 @@ def build_agent(
     detector.setup(installation)
     fusion = build_fusion(settings, detector)
     used = [sensor for sensor in sensors.values() if sensor.kind in detector.needs]
-    view = view_sectors(used, spec, detector.range_of)
+    view = view_sectors(used, spec, partial(checked_range, detector))
     listens = planner != NO_PLANNER or settings.restricts_senders
     driver: Planner | None = None
     if planner != NO_PLANNER:

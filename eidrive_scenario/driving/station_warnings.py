@@ -17,6 +17,7 @@ from eidrive_scenario.driving.station_declarations import possible_drivers, prop
 from eidrive_scenario.errors import Diagnostic, ErrorSubject
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.perception.detector import Detector, DetectorContext
+from eidrive_scenario.perception.result_checks import checked_range
 from eidrive_scenario.perception.traffic_lights import StopLine, stop_lines
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.v2x.link_models.delay import ConstantDelay
@@ -152,7 +153,7 @@ def short_views(settings: Mapping[str, AgentSettings], detectors: Mapping[str, D
         if detector is None or deceleration is None or speed is None:
             continue
         sensors = station.rig_sensors(detector.needs, detector.default_sensors).values()
-        ranges = [detector.range_of(sensor) for sensor in sensors if sensor.kind in detector.needs]
+        ranges = [checked_range(detector, sensor) for sensor in sensors if sensor.kind in detector.needs]
         view, needed = max(ranges, default=math.inf), speed * REACTION + speed**2 / (2.0 * deceleration)
         if needed > view:
             yield Diagnostic(

@@ -18,7 +18,14 @@ from eidrive_scenario.errors import InvalidResult
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.faults import FalseObject, PoseError, with_false_objects
 from eidrive_scenario.perception.localization import Localizer, PoseNoiseProcess, add_pose_error
-from eidrive_scenario.perception.result_checks import check_array, checked_detections, describe, is_checked
+from eidrive_scenario.perception.result_checks import (
+    ROUNDING,
+    check_array,
+    checked_detections,
+    describe,
+    is_checked,
+    raise_outside,
+)
 from eidrive_scenario.perception.tracking.method import TrackingMethod
 from eidrive_scenario.perception.tracking.motion_models import KNOWN_SPEED
 from eidrive_scenario.perception.tracking.uncertain_pose import PoseErrors, PoseUncertainty
@@ -215,6 +222,7 @@ class Perception:
         def in_view(boxes: Array) -> Array:
             shares = self.detector.in_view(boxes, readings, detections)
             check_array(self.detector, "in_view", "shares", shares, (len(boxes),))
+            raise_outside(self.detector, "in_view", "shares", shares, 0.0, 1.0, ROUNDING)
             return shares
 
         tracked = self._tracker.update(detections, in_view)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from numbers import Real
 
 import numpy as np
 
@@ -10,12 +11,14 @@ from eidrive_scenario.base.arrays import Array, Bools
 from eidrive_scenario.base.detections import CLASSES, Detections
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.errors import InvalidResult
+from eidrive_scenario.perception.detector import Detector
+from eidrive_scenario.sensing.settings import SensorSettings
 
 LARGEST = 1e9
 """Maximum magnitude of a coordinate [m], as in road files, and of a speed [m/s]."""
 LARGEST_SIZE = 1e5
 """Maximum length, width or height of an object [m], as in road files."""
-_ROUNDING = 1e-5
+ROUNDING = 1e-5
 """Excess of a probability over 1, and relative error of a covariance, that single precision explains."""
 
 _REAL = "fiu"
@@ -77,8 +80,8 @@ def check_detections(extension: object, method: str, detections: object, *, now:
     variances = detections.covariance.reshape(-1, 4)[:, ::3]
     raise_outside(extension, method, "boxes", detections.boxes, -LARGEST, LARGEST)
     raise_outside(extension, method, "a length, width or height", detections.boxes[:, 3:6], 0.0, LARGEST_SIZE)
-    raise_outside(extension, method, "scores", detections.scores, 0.0, 1.0, _ROUNDING)
-    raise_outside(extension, method, "existence", detections.existence, 0.0, 1.0, _ROUNDING)
+    raise_outside(extension, method, "scores", detections.scores, 0.0, 1.0, ROUNDING)
+    raise_outside(extension, method, "existence", detections.existence, 0.0, 1.0, ROUNDING)
     raise_outside(extension, method, "velocity", detections.velocity, -LARGEST, LARGEST)
     raise_outside(extension, method, "covariance", detections.covariance, -(LARGEST**2), LARGEST**2)
     raise_outside(extension, method, "a variance", variances, 0.0, LARGEST**2)
@@ -87,6 +90,14 @@ def check_detections(extension: object, method: str, detections: object, *, now:
         text = f"returned covariance with the value {impossible[0].tolist()}"
         raise InvalidResult(extension, method, f"{text} (expected a symmetric matrix without negative eigenvalues)")
     raise_outside(extension, method, "velocity_variance", detections.velocity_variance, 0.0, LARGEST**2)
+
+
+def checked_range(detector: Detector, sensor: SensorSettings) -> float:
+    """Return the range of a sensor by a detector [m]. Raise InvalidResult unless it is a number of at least 0."""
+    value: object = detector.range_of(sensor)
+    if not isinstance(value, Real) or not float(value) >= 0.0:
+        raise InvalidResult(detector, "range_of", f"returned {value!r} (expected a number of at least 0 m)")
+    return float(value)
 
 
 def check_array(extension: object, method: str, name: str, values: object, shape: tuple[int, ...]) -> None:
@@ -158,11 +169,11 @@ def _is_in_range(detections: Detections) -> bool:
 def _are_impossible(covariance: Array) -> Bools:
     """Return which matrices (N, 2, 2) of variances of at least 0 are no covariances; False for NaN."""
     xx, xy, yx, yy = covariance.reshape(-1, 4).T.astype(float)
-    return np.asarray((np.abs(xy - yx) > _ROUNDING * (xx + yy)) | (xy * yx > (1.0 + _ROUNDING) * xx * yy))
+    return np.asarray((np.abs(xy - yx) > ROUNDING * (xx + yy)) | (xy * yx > (1.0 + ROUNDING) * xx * yy))
 
 
 def _are_probabilities(values: Array) -> bool:
-    return bool(values.min() >= 0.0 and values.max() <= 1.0 + _ROUNDING)
+    return bool(values.min() >= 0.0 and values.max() <= 1.0 + ROUNDING)
 
 
 def _check_rows(extension: object, method: str, detections: Detections) -> None:

@@ -227,7 +227,7 @@ class WithShares(WithoutVelocity):
         return self.shares
 
 
-@pytest.mark.parametrize("shares", [None, 1.0, np.ones(3), np.array([np.nan])])
+@pytest.mark.parametrize("shares", [None, 1.0, np.ones(3), np.array([np.nan]), np.array([-3.0])])
 def test_in_view_with_invalid_result_raises(shares: Any) -> None:
     perception = Perception(WithShares(shares), tracker=Tracker(TrackerSettings()))
     for tick in range(4):

@@ -15,8 +15,9 @@ from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.errors import InvalidResult, RegistryError
 from eidrive_scenario.perception.detector import Detector
 from eidrive_scenario.perception.oracle import OracleDetector
-from eidrive_scenario.perception.result_checks import check_detections, is_checked
+from eidrive_scenario.perception.result_checks import check_detections, checked_range, is_checked
 from eidrive_scenario.sensing.readings import Readings
+from eidrive_scenario.sensing.settings import LidarSettings
 
 BOX = np.array([[30.0, 0.0, 0.75, 4.5, 1.8, 1.5, 0.0]])
 
@@ -115,6 +116,13 @@ def test_is_checked_for_derived_classes_of_third_parties() -> None:
     ("name", "value", "diagnostic"),
     [
         ("needs", "camera", "needs is 'camera'"),
+@pytest.mark.parametrize("value", [None, -5.0, math.nan, "60"])
+def test_checked_range_refuses_other_values_than_lengths(value: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Named, "range_of", lambda *_: value)
+    with pytest.raises(InvalidResult, match=r"range_of returned .* at least 0 m"):
+        checked_range(Named(), LidarSettings())
+
+
         ("needs", frozenset({"sonar"}), r"needs is frozenset\({'sonar'}\)"),
         ("settings_type", dict, "settings_type is <class 'dict'>"),
     ],
