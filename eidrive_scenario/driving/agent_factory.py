@@ -69,7 +69,12 @@ def build_detector(settings: AgentSettings, *, source: str = "", line: int | Non
     """Build the detector of a station. Raise SettingError with this location if its settings are invalid."""
     kind, own = selected_extension(settings, "detector", Detector, source=source, line=line)
     _check_needs(settings.detector, kind)
-    return construct(kind, *own)  # type: ignore[no-any-return]
+    detector: Detector = construct(kind, *own)
+    deviation: object = detector.velocity_deviation
+    if deviation is not None and not (isinstance(deviation, Real) and 0.0 < float(deviation) < math.inf):
+        described = registry("detectors").describe(settings.detector)
+        raise RegistryError(f"{described}: velocity_deviation is {deviation!r} (expected a positive number or None)")
+    return detector
 
 
 def build_fusion(

@@ -128,6 +128,8 @@ def test_checked_range_refuses_other_values_than_lengths(value: Any, monkeypatch
     ],
 )
 def test_detector_class_with_invalid_declaration_is_error(
+        ("velocity_deviation", 0.0, r"velocity_deviation is 0\.0 \(expected a positive number or None\)"),
+        ("velocity_deviation", "1", "velocity_deviation is '1'"),
     name: str, value: object, diagnostic: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(OracleDetector, name, value)
