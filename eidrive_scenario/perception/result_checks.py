@@ -187,8 +187,8 @@ def _check_rows(extension: object, method: str, detections: Detections) -> None:
             classes = ", ".join(CLASSES)
             raise InvalidResult(extension, method, f"returned the class {kind!r} (expected one of {classes})")
     for track in detections.tracks:
-        if not isinstance(track, int | np.integer):
-            raise InvalidResult(extension, method, f"returned the track {track!r} (expected an integer)")
+        if not isinstance(track, int | np.integer) or not -(2**63) <= track < 2**63:
+            raise InvalidResult(extension, method, f"returned the track {track!r} (expected an integer of 64 bits)")
 
 
 def _without_nan(value: object) -> object:

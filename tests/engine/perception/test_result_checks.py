@@ -88,6 +88,10 @@ def test_check_detections_accepts_finite_numbers(found: Detections) -> None:
         (lambda: detections(classes=("dragon",)), "returned the class 'dragon'"),
         (lambda: detections(classes=([],)), "returned the class []"),
         (lambda: detections(tracks=("a",)), "returned the track 'a'"),
+        (
+            lambda: detections(tracks=(2**63,)),
+            "returned the track 9223372036854775808 (expected",
+        ),
         (lambda: None, "returned None"),
         (lambda: (), "returned an object of type tuple"),
     ],
@@ -112,10 +116,6 @@ def test_is_checked_for_derived_classes_of_third_parties() -> None:
     assert is_checked(Derived())
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "diagnostic"),
-    [
-        ("needs", "camera", "needs is 'camera'"),
 @pytest.mark.parametrize("value", [None, -5.0, math.nan, "60"])
 def test_checked_range_refuses_other_values_than_lengths(value: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Named, "range_of", lambda *_: value)
@@ -123,13 +123,17 @@ def test_checked_range_refuses_other_values_than_lengths(value: Any, monkeypatch
         checked_range(Named(), LidarSettings())
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "diagnostic"),
+    [
+        ("needs", "camera", "needs is 'camera'"),
         ("needs", frozenset({"sonar"}), r"needs is frozenset\({'sonar'}\)"),
+        ("velocity_deviation", 0.0, r"velocity_deviation is 0\.0 \(expected a positive number or None\)"),
+        ("velocity_deviation", "1", "velocity_deviation is '1'"),
         ("settings_type", dict, "settings_type is <class 'dict'>"),
     ],
 )
 def test_detector_class_with_invalid_declaration_is_error(
-        ("velocity_deviation", 0.0, r"velocity_deviation is 0\.0 \(expected a positive number or None\)"),
-        ("velocity_deviation", "1", "velocity_deviation is '1'"),
     name: str, value: object, diagnostic: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(OracleDetector, name, value)
