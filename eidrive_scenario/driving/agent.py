@@ -193,7 +193,7 @@ class Agent:
             if self._regions is not None:
                 self.planner.observe_regions(self._regions.newest(now))
             plan = self.planner.plan(ego, perceived.fused, action.requested_goal(perceived.goal), now)
-            check_plan(self.planner, plan)
+            check_plan(self.planner, plan, len(perceived.fused))
         return AgentStep(
             detections=detections,
             inbox=perceived.inbox,

@@ -10,13 +10,15 @@ import numpy as np
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
 from eidrive_scenario.driving.planning.route_planner import Planner
 from eidrive_scenario.driving.step import MAX_TARGET_SPEED, Plan
-from eidrive_scenario.errors import InvalidResult
+from eidrive_scenario.errors import InvalidResult, quoted
 from eidrive_scenario.perception.result_checks import LARGEST, are_within, describe, raise_not_finite, raise_outside
 from eidrive_scenario.world.actor import Control
 
 
-def check_plan(planner: Planner, plan: object) -> None:
+def check_plan(planner: Planner, plan: object, count: int) -> None:
     """Raise InvalidResult unless `plan` is a Plan of at least two points and as many speeds.
+
+    count  number of objects that were passed to the planner
 
     All numbers are finite. No coordinate exceeds LARGEST [m], no speed or acceleration MAX_TARGET_SPEED.
     """
@@ -24,6 +26,13 @@ def check_plan(planner: Planner, plan: object) -> None:
         raise InvalidResult(planner, "plan", f"returned {describe(plan)} (expected Plan)")
     if not isinstance(plan.objects, tuple):
         raise InvalidResult(planner, "plan", f"returned objects as {describe(plan.objects)} (expected a tuple of rows)")
+    for row in plan.objects:
+        if not (isinstance(row, int | np.integer) and 0 <= row < count):
+            raise InvalidResult(planner, "plan", f"returned the object {quoted(row)} (expected 0 to {count - 1})")
+    try:
+        plan.reason.encode()
+    except (AttributeError, UnicodeEncodeError):
+        raise InvalidResult(planner, "plan", f"returned the reason {quoted(plan.reason)} (expected a text)") from None
     points, speeds = plan.points, plan.speeds
     for name, array in (("points", points), ("speeds", speeds)):
         if not isinstance(array, np.ndarray):
@@ -55,8 +64,7 @@ def check_plan(planner: Planner, plan: object) -> None:
 
 
 def check_followed(planner: Planner, plan: Plan) -> None:
-    """Raise InvalidResult if a plan is the reason for which the controller fails."""
-    check_plan(planner, plan)
+    """Raise InvalidResult if a checked plan is the reason for which the controller fails."""
     steps = np.hypot(*np.diff(plan.points, axis=0).T)
     if (equal := np.flatnonzero(steps == 0.0)).size:
         row = int(equal[0])

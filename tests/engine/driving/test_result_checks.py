@@ -39,11 +39,12 @@ def plan(**fields: Any) -> Plan:
         plan(),
         plan(points=POINTS + 1e8, speeds=np.full(3, -1.0), acceleration=-8, braking=8.0),
         plan(points=POINTS.astype(np.int16), speeds=np.zeros(3, np.float32)),
+        plan(objects=(0, np.int64(1))),
     ],
-    ids=["usual", "far and backwards", "other types"],
+    ids=["usual", "far and backwards", "other types", "all objects"],
 )
 def test_check_plan_numbers_in_range_accepts(made: Plan) -> None:
-    check_plan(StraightPlanner(), made)
+    check_plan(StraightPlanner(), made, count=2)
 
 
 @pytest.mark.parametrize(
@@ -60,10 +61,15 @@ def test_check_plan_numbers_in_range_accepts(made: Plan) -> None:
         (plan(acceleration=None), "returned acceleration as None"),
         (plan(braking=1e300), "returned braking with the value 1e+300"),
         (plan(braking="hard"), "returned braking as an object of type str"),
+        (plan(objects=("Incoming",)), "returned the object 'Incoming' (expected 0 to 1)"),
+        (plan(objects=(2,)), "returned the object 2 (expected 0 to 1)"),
+        (plan(objects=(-1,)), "returned the object -1"),
+        (plan(reason="\udcff"), "returned the reason '\\udcff' (expected a text)"),
+        (plan(reason=None), "returned the reason None"),
         (plan(points=POINTS[:1], speeds=np.ones(1)), "returned points of shape (1, 2) and speeds of shape (1,)"),
     ],
 )
 def test_check_plan_numbers_out_of_range_refuses(made: Any, diagnostic: str) -> None:
     with pytest.raises(InvalidResult) as caught:
-        check_plan(StraightPlanner(), made)
+        check_plan(StraightPlanner(), made, count=2)
     assert str(caught.value).startswith(f"plan {diagnostic}")
