@@ -111,6 +111,8 @@ class Guarded(TyperGroup):
                 with suppress(OSError):
                     flush_output()
                 raise typer.Exit(BROKEN_PIPE) from error
+            if isinstance(error, SystemExit) and _is_of_command(error):
+                raise
             (show_traceback if ctx.params.get("traceback") else print_error)(error)
             with suppress(OSError):
                 flush_output()
@@ -208,6 +210,12 @@ def _attribute(error: BaseException) -> BaseException:
     except ExtensionError as attributed:
         return attributed
     return error
+
+
+def _is_of_command(error: BaseException) -> bool:
+    """Return whether a command of another package raised the error."""
+    attributed = _attribute(error)
+    return isinstance(attributed, ExtensionError) and attributed.place.kind == "command"
 
 
 def _from_typer(error: BaseException) -> bool:

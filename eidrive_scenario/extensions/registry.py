@@ -38,7 +38,7 @@ class Registration(NamedTuple):
     value: str
 
 
-_loaded: dict[type, Registration] = {}
+_loaded: dict[Any, Registration] = {}
 """Registration of each loaded extension."""
 
 
@@ -115,10 +115,11 @@ class Registry:
         if inspect.isabstract(extension):
             missing = ", ".join(sorted(extension.__abstractmethods__))
             raise RegistryError(f"{described} lacks {missing}")
+        if isinstance(extension, type) or inspect.isfunction(extension):
+            _loaded.setdefault(extension, Registration(singular(self.kind), name, point.value))
         if isinstance(extension, type):
             for mismatch in _signature_mismatches(extension):
                 raise RegistryError(f"{described}: {mismatch}")
-            _loaded.setdefault(extension, Registration(singular(self.kind), name, point.value))
             _checked[self.kind, name, base] = (extension,)
         return extension
 

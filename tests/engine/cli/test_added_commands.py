@@ -18,6 +18,8 @@ version = "1"
 [project.entry-points."eidrive_scenario.commands"]
 hello = "acme_cmd:main"
 broken = "acme_cmd:nothing"
+fail = "acme_cmd:fail"
+leave = "acme_cmd:leave"
 list = "acme_cmd:main"
 [tool.eidrive]
 pythonpath = ["."]
@@ -28,6 +30,14 @@ import typer
 
 def main(name: str = "world") -> None:
     typer.echo(f"hello {name}")
+
+
+def fail() -> None:
+    raise ZeroDivisionError("no runs")
+
+
+def leave() -> None:
+    raise SystemExit(7)
 """
 
 
@@ -47,9 +57,11 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (["hello"], False, 2, "No such command 'hello'"),
         (["helo"], True, 2, "Did you mean 'hello'"),
         (["broken"], True, 3, "command 'broken' (acme_cmd:nothing) does not load"),
+        (["fail"], True, 3, "acme_cmd.py:9: command 'fail' (acme_cmd:fail): ZeroDivisionError: no runs"),
+        (["leave"], True, 7, ""),
         (["list", "commands"], True, 0, "hello      acme_cmd:main"),
     ],
-    ids=["inside", "outside", "unselected", "misspelled", "broken", "name of the engine"],
+    ids=["inside", "outside", "unselected", "misspelled", "broken", "exception", "exit code", "name of the engine"],
 )
 def test_command_of_project(
     project: Path, tmp_path: Path, arguments: list[str], inside: bool, code: int, expected: str
