@@ -24,6 +24,7 @@ from eidrive_scenario.errors import Diagnostic as Diagnostic
 from eidrive_scenario.errors import EidriveError as EidriveError
 from eidrive_scenario.errors import ExtensionError as ExtensionError
 from eidrive_scenario.errors import InputError as InputError
+from eidrive_scenario.errors import RegistryError as RegistryError
 from eidrive_scenario.errors import ScenarioError as ScenarioError
 from eidrive_scenario.errors import SettingError as SettingError
 from eidrive_scenario.errors import SimulationError as SimulationError
