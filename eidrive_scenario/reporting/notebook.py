@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.files.bounded import path_argument
+from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.recording.recording import open_recording
 from eidrive_scenario.recording.run_files import recording_in
 from eidrive_scenario.reporting.drawing.scenario_picture import is_road_file, source_figure
@@ -74,18 +75,19 @@ def show(run: RunResult | str | PathLike[str], height: int = HEIGHT) -> RunDispl
     return RunDisplay(verdicts + ("" if recording is None else _replay_frame(recording, height)), text)
 
 
-def draw(source: str | PathLike[str], size: Size = DEFAULT_SIZE, station: str | None = None) -> Picture:
+def draw(source: str | PathLike[str] | Scenario, size: Size = DEFAULT_SIZE, station: str | None = None) -> Picture:
     """Return the picture of a scenario before its run, or of a road file.
 
-    source   file .xosc or .xodr, or name of a scenario of the library
+    source   file .xosc or .xodr, name of a scenario of the library, or a loaded Scenario
     size     width and height [mm]
     station  whose view is shaded; by default the first that drives
 
     Raise InputError for an invalid file, SettingError for a station of a road file or another size.
     """
-    path = path_argument(source, "source", "the path of a scenario or road file, or a library name")
-    path = path if is_road_file(path) else resolve_scenario(path)
-    return Picture(source_figure(path, checked_size(size), station))
+    if not isinstance(source, Scenario):
+        path = path_argument(source, "source", "the path of a scenario or road file, a library name or a Scenario")
+        source = path if is_road_file(path) else resolve_scenario(path)
+    return Picture(source_figure(source, checked_size(size), station))
 
 
 def write_report(*runs: str | PathLike[str], out: str | PathLike[str]) -> Path:

@@ -22,7 +22,7 @@ from eidrive_scenario.driving.agent_factory import build_detector
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError, quoted, suggestion
 from eidrive_scenario.evaluation.lines_of_sight import LinesOfSight
 from eidrive_scenario.extensions.library import ROADS_SUFFIX, definition
-from eidrive_scenario.openscenario import model
+from eidrive_scenario.openscenario import Scenario, model
 from eidrive_scenario.reporting.drawing.canvas import Canvas
 from eidrive_scenario.reporting.drawing.labels import write_labels
 from eidrive_scenario.reporting.drawing.road_drawing import network_drawing, simplify_line
@@ -302,7 +302,7 @@ def is_road_file(path: Path) -> bool:
     return path.suffix.lower() == ROADS_SUFFIX or definition(path) == "roads"
 
 
-def source_figure(path: Path, size: Size, station: str | None = None) -> Figure:
+def source_figure(source: Path | Scenario, size: Size, station: str | None = None) -> Figure:
     """Return the picture of a scenario before its run, or of a road file.
 
     size     width and height [mm]
@@ -310,17 +310,17 @@ def source_figure(path: Path, size: Size, station: str | None = None) -> Figure:
 
     Raise InputError for a file that is invalid, too large or cannot be run, SettingError for a station of a road file.
     """
-    if not is_road_file(path):
-        with Simulation(path, load_weights=False) as simulation:
+    if isinstance(source, Scenario) or not is_road_file(source):
+        with Simulation(source, load_weights=False) as simulation:
             picture = ScenarioPicture.of(simulation, station)
         roads = network_drawing(simulation.roads)
         labels = RoadLabels(simulation.roads) if simulation.roads is not None else None
         return scene_figure(lambda canvas: picture.draw(canvas, roads, labels), picture.section, size)
     if station is not None:
         raise SettingError(
-            Diagnostic(f"a road file has no station (got {quoted(station)})", "give a scenario", str(path))
+            Diagnostic(f"a road file has no station (got {quoted(station)})", "give a scenario", str(source))
         )
-    network = RoadNetwork.load(path)
+    network = RoadNetwork.load(source)
     drawing, road_labels = network_drawing(network), RoadLabels(network)
     left, bottom, right, top = network.bounds()
 

@@ -11,7 +11,8 @@ import pytest
 from lxml import etree
 
 from eidrive_scenario.api import report
-from eidrive_scenario.api.run import RunResult, run_and_save, run_file
+from eidrive_scenario.api.common import Scenario
+from eidrive_scenario.api.run import RunResult, load_scenario, run_and_save, run_file
 from eidrive_scenario.errors import InputError, SettingError
 from eidrive_scenario.extensions.library import library_path
 
@@ -46,8 +47,10 @@ def test_pages_are_those_of_the_command_line(recorded: RunResult, tmp_path: Path
         report.write_replay(tmp_path / "absent", tmp_path / "replay.html")
 
 
-@pytest.mark.parametrize("source", ["coop/scenario_1", library_path() / "roads" / "coop_1.xodr"])
-def test_pictures_are_vectors_in_notebooks_and_files(source: str | Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "source", ["coop/scenario_1", library_path() / "roads" / "coop_1.xodr", load_scenario("coop/scenario_1")]
+)
+def test_pictures_are_vectors_in_notebooks_and_files(source: str | Path | Scenario, tmp_path: Path) -> None:
     picture = report.draw(source, size=(120, 80))
     assert etree.fromstring(picture._repr_svg_().encode()).tag.endswith("svg")
     picture.write(tmp_path / "picture.pdf")
