@@ -49,13 +49,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, default=Path("station.csv"))
     given = parser.parse_args(arguments)
     settings = RunSettings(channel=given.channel)
-    with (
-        given.out.open("w", newline="", encoding="utf-8") as stream,
-        Simulation(given.scenario, seed=given.seed, settings=settings) as simulation,
-    ):
-        writer = csv.writer(stream)
-        writer.writerow(COLUMNS)
-        writer.writerows(rows(simulation, given.station))
+    with Simulation(given.scenario, seed=given.seed, settings=settings) as simulation:
+        if given.station not in simulation.stack.settings:
+            parser.error(f"no station {given.station!r}; stations: {', '.join(simulation.stack.settings)}")
+        with given.out.open("w", newline="", encoding="utf-8") as stream:
+            writer = csv.writer(stream)
+            writer.writerow(COLUMNS)
+            writer.writerows(rows(simulation, given.station))
         result = simulation.result()
     print(result)
     print(given.out)

@@ -100,6 +100,15 @@ def test_step_by_hand_shows_why_the_ego_brakes(tmp_path: Path, channel: str, bra
     assert any("conflict area" in row["reason"] and float(row["brake"]) > 0.0 for row in before) is braked
 
 
+@pytest.mark.process
+def test_step_by_hand_with_unknown_station_lists_the_stations(tmp_path: Path) -> None:
+    command = [sys.executable, str(EXAMPLES / "step_by_hand.py"), "--station", "Nope", "--out", str(tmp_path / "a.csv")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "no station 'Nope'; stations: Ego, RSU" in done.stderr
+    assert not (tmp_path / "a.csv").exists()
+
+
 @pytest.mark.statistical
 def test_policy_is_better_than_the_rule_under_latency(tmp_path: Path) -> None:
     pytest.importorskip("gymnasium")
