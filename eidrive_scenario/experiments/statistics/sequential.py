@@ -126,10 +126,14 @@ def success_rate(
 
     A pass is wrong, and a failure is wrong at a rate of `expected`, with a probability of at most 1 - confidence.
     `expected` is the rate of a system that should pass; the default is half of the permitted failures. The nearer it is
-    to the required rate, the more runs are needed. Raise ValueError as `RatioTest`, and for a confidence out of
-    (0.5, 1).
+    to the required rate, the more runs are needed. Raise ValueError as `RatioTest`, and for a rate or confidence out
+    of range.
     """
     if not 0.5 < confidence < 1.0:
         raise ValueError(f"confidence: not between 0.5 and 1 (got {confidence})")
+    if not 0.0 < at_least < 1.0:
+        raise ValueError(f"at_least: not between 0 and 1 (got {at_least})")
+    if expected is not None and not at_least < expected < 1.0:
+        raise ValueError(f"expected: not between at_least and 1 (got {expected} and {at_least})")
     risk = 1.0 - confidence
     return RatioTest((1.0 + at_least) / 2.0 if expected is None else expected, at_least, risk, risk, limit)

@@ -131,10 +131,16 @@ def test_ratio_test_with_invalid_arguments_raises(arguments: dict[str, float], e
         RatioTest(**arguments)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("at_least", [0.0, 1.0, -0.1, math.nan])
+@pytest.mark.parametrize("at_least", [0.0, 1.0, 1.2, -0.1, math.nan])
 def test_success_rate_with_impossible_rate_raises(at_least: float) -> None:
-    with pytest.raises(ValueError, match="rates"):
+    with pytest.raises(ValueError, match=r"^at_least: not between 0 and 1"):
         success_rate(at_least)
+
+
+@pytest.mark.parametrize("expected", [0.8, 0.9, 1.0, math.nan])
+def test_success_rate_with_impossible_expected_rate_raises(expected: float) -> None:
+    with pytest.raises(ValueError, match=r"^expected: not between at_least and 1"):
+        success_rate(0.9, expected=expected)
 
 
 def test_success_rate_with_low_confidence_raises() -> None:
