@@ -81,9 +81,10 @@ class Detections(msgspec.Struct, frozen=True, gc=False):
 
     def freeze(self) -> Self:
         """Make the arrays read-only, as several stations, messages and observers share them; return the detections."""
-        arrays = self.boxes, self.scores, self.velocity, self.covariance, self.existence, self.velocity_variance
-        for array in arrays:
-            array.setflags(write=False)
+        if self.boxes.flags.writeable:  # most are passed on with read-only arrays
+            arrays = self.boxes, self.scores, self.velocity, self.covariance, self.existence, self.velocity_variance
+            for array in arrays:
+                array.setflags(write=False)
         return self
 
     @classmethod
