@@ -36,6 +36,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     HASTY,
     ONCOMING_SPEED,
     ROUTE,
+    SPEED_SHARES,
     TOWARDS_GAP,
     WALKING_PACE,
     Body,
@@ -468,7 +469,7 @@ class Decider:
             emergency=self._emergency,
             gives_up=profile.gives_up,
             is_current=number == 0,
-            comfortable=TOWARDS_GAP if seeks_gap else (1.0,) if follows else (),
+            comfortable=TOWARDS_GAP if seeks_gap else SPEED_SHARES if follows else (),
         ):
             kind = proposal.precedence
             if kind not in reactions:
