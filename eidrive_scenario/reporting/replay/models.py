@@ -85,6 +85,7 @@ def _packed(content: bytes) -> str:
 def street_models(network: RoadNetwork | None) -> Data:
     """Return what stands still.
 
+    origin    of `surfaces` and `houses` in the world, the middle of the land
     surfaces  model of roads and markings; None without roads
     houses    model of all buildings; None without any
     objects   [model, poses] of road objects, signals and signs; a pose is [x, y, z, heading]
@@ -93,12 +94,15 @@ def street_models(network: RoadNetwork | None) -> Data:
     """
     if network is None:
         land = _land(np.zeros((1, 3)), "asphalt")
-        return {"surfaces": None, "houses": None, "objects": [], "land": land, "level": True}
+        return {"origin": [0, 0, 0], "surfaces": None, "houses": None, "objects": [], "land": land, "level": True}
     meshes = surface_meshes(network)
-    surfaces = [model({mesh.kind: mesh.vertices[mesh.faces]}, {mesh.kind: mesh.color}) for mesh in meshes]
     points = np.concatenate([mesh.vertices for mesh in meshes]) if meshes else np.zeros((1, 3))
-    houses = [building_model(each, np.zeros(3)) for each in buildings(network)]
+    # Integers of 32 bits in millimeters reach 2,147 km, less than coordinates of UTM.
+    origin = np.rint((points.min(axis=0) + points.max(axis=0)) / 2.0) * (1.0, 1.0, 0.0)
+    surfaces = [model({mesh.kind: mesh.vertices[mesh.faces] - origin}, {mesh.kind: mesh.color}) for mesh in meshes]
+    houses = [building_model(each, origin) for each in buildings(network)]
     return {
+        "origin": origin.tolist(),
         "surfaces": encoded_model(merged(surfaces)) if surfaces else None,
         "houses": encoded_model(merged(houses)) if houses else None,
         "objects": [[encoded_model(source), np.round(poses, 3).tolist()] for source, poses in _objects(network)],

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from opendrive_xml import map_xml, road_xml
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.experiments.single_run import run_and_save
@@ -142,6 +143,18 @@ def test_street_has_the_surfaces_and_houses_of_the_map() -> None:
     expected = max(house.size[2] for house in buildings(network))
     assert corners[:, 2].max() == pytest.approx(expected, abs=0.01)
     assert json.loads(json.dumps(street)) == street_models(network), "the values are plain and repeatable"
+
+
+def test_street_with_coordinates_of_utm_keeps_its_shape() -> None:
+    """Integers of 32 bits in millimeters end at 2,147 km, and single precision resolves 0.5 m at 5,334 km."""
+    offset = (691000.0, 5334000.0, 0.0)
+    near, far = (
+        street_models(RoadNetwork.parse(map_xml(road_xml(x=x, y=y, length=100.0))))
+        for x, y, _ in ((0.0, 0.0, 0.0), offset)
+    )
+    assert np.subtract(far["origin"], near["origin"]).tolist() == list(offset)
+    for kind, triangles in unpacked(near["surfaces"]).items():
+        assert np.abs(unpacked(far["surfaces"])[kind] - triangles).max() < 0.002
 
 
 def test_run_without_roads_has_bare_ground() -> None:

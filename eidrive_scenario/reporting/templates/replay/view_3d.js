@@ -55,7 +55,7 @@ async function buildSpace(THREE) {
   const over = (factor) => ({ polygonOffset: true, polygonOffsetFactor: factor, polygonOffsetUnits: 4 * factor });
   Object.assign(space, {
     renderer, scene, camera: new THREE.PerspectiveCamera(60, 1, 0.25, 4000), paints: new Map(),
-    origin: [Math.round((left + right) / 2), Math.round((bottom + top) / 2), 0],
+    origin: street.origin,
     materials: { solid: solid(), land: solid(over(4)), road: solid(), marking: solid(over(-2)) },
     sun: new THREE.DirectionalLight(), ambient: new THREE.HemisphereLight(), sky: skyMesh(THREE) });
   const { sun, ambient, sky, materials } = space;
@@ -68,11 +68,11 @@ async function buildSpace(THREE) {
   land.setAttribute("color", new THREE.Float32BufferAttribute([0, 1, 2, 3].flatMap(() => street.land.color), 3));
   addStill(new THREE.Mesh(land, materials.land), [0, 0, street.land.z], false);
   if (street.surfaces) {
-    const parts = await decode(street.surfaces, space.origin), isMarking = ([kind]) => kind.startsWith("marking");
+    const parts = await decode(street.surfaces), isMarking = ([kind]) => kind.startsWith("marking");
     if (!street.level) indexGround(parts);
     addStill(new THREE.Mesh(geometry(THREE, parts, isMarking), [materials.road, materials.marking]), [0, 0, 0], false);
   }
-  if (street.houses) addStill(new THREE.Mesh(geometry(THREE, await decode(street.houses, space.origin)), materials.solid), [0, 0, 0]);
+  if (street.houses) addStill(new THREE.Mesh(geometry(THREE, await decode(street.houses)), materials.solid), [0, 0, 0]);
   for (const [model, poses] of street.objects) {
     const mesh = new THREE.InstancedMesh(geometry(THREE, await decode(model)), materials.solid, poses.length);
     const turn = new THREE.Matrix4(), [ox, oy] = space.origin;
@@ -96,18 +96,18 @@ const overlay = (THREE, opacity, color = "#ffffff") => new THREE.MeshBasicMateri
   color, opacity, transparent: true, depthWrite: false, toneMapped: false, fog: false, side: THREE.DoubleSide,
   polygonOffset: true, polygonOffsetFactor: -4, polygonOffsetUnits: -16 });
 
-/* Return the parts of a model of the page: material, color, points (3 V) [m] relative to `origin`, and corners (3 F). */
-async function decode({ parts, data: text }, origin = [0, 0, 0]) {
+/* Return the parts of a model of the page: material, color, points (3 V) [m], and corners (3 F). */
+async function decode({ parts, data: text }) {
   const numbers = new Int32Array(await inflate(text));
   let at = 0;
   const rows = (count, read) => {
     const found = new Array(3 * count);
     for (let row = 0; row < 3; row += 1)
-      for (let i = 0, sum = 0; i < count; i += 1) found[3 * i + row] = read(sum += numbers[at++], row);
+      for (let i = 0, sum = 0; i < count; i += 1) found[3 * i + row] = read(sum += numbers[at++]);
     return found;
   };
   return parts.map(([material, color, vertices, triangles]) => [
-    material, color, rows(vertices, (value, axis) => value / 1000 - origin[axis]), rows(triangles, (value) => value)]);
+    material, color, rows(vertices, (value) => value / 1000), rows(triangles, (value) => value)]);
 }
 
 /* Return the geometry of parts; those for which `isSecond` is true have the second material of the mesh. */
