@@ -192,6 +192,20 @@ def test_vehicle_brakes_comfortably_for_traffic_from_the_right(later: float) -> 
     assert enters < arrival + 4.5
 
 
+@pytest.mark.parametrize("later", [0.5, 0.75, 1.0])
+def test_vehicle_slows_down_comfortably_instead_of_stopping(later: float) -> None:
+    """A car with the right of way is in the middle of the junction somewhat later than the vehicle would be. With 40 %
+    of its speed, which takes 2.4 s with 2 m/s², the vehicle passes behind it."""
+    roads = RoadNetwork.load(ROADS / "four_way_junction.xodr")
+    run = PlannedDrive(behavior(roads, 8.0), roads, speed=8.0, start=-30.0, y=0.0)
+    arrival = 72.0 / 8.0 + later
+    run.run(20.0, lambda now: [KnownBox(43.8, 8.0 * (now - arrival), vy=8.0, yaw=math.pi / 2.0)])
+    run.world.close()
+    speeds = np.array(run.speeds)
+    assert ((speeds[:-10] - speeds[10:]) / 0.5).max() < 2.1
+    assert speeds.min() == pytest.approx(0.4 * 8.0, abs=0.15)
+
+
 def test_possible_turn_of_a_late_car_causes_no_emergency_braking() -> None:
     """A car from the right with the right of way appears when the vehicle is 17 m before its way, from 10 m/s a stop
     with 2.9 m/s². If it turned left, the vehicle would have to stop earlier."""
