@@ -174,15 +174,22 @@ def test_vehicle_with_the_right_of_way_does_not_brake_for_oncoming_traffic(speed
     assert min(run.speeds) > speed - 0.1
 
 
-@pytest.mark.parametrize("later", [-0.75, 0.0, 0.75])
-def test_vehicle_brakes_comfortably_for_traffic_from_the_right(later: float) -> None:
-    """A car with the right of way drives straight on; until it is in the junction it could also turn left, across a
-    nearer part of the way of the vehicle. Both would be in the middle of the junction at about the same time."""
+def drive_past_a_car_from_the_right(later: float) -> tuple[PlannedDrive, float]:
+    """Return a drive with 8 m/s straight over a junction, and the time at which a car from the right is in its middle:
+    later than the vehicle would be [s]."""
     roads = RoadNetwork.load(ROADS / "four_way_junction.xodr")
     run = PlannedDrive(behavior(roads, 8.0), roads, speed=8.0, start=-30.0, y=0.0)
     arrival = 72.0 / 8.0 + later
     run.run(20.0, lambda now: [KnownBox(43.8, 8.0 * (now - arrival), vy=8.0, yaw=math.pi / 2.0)])
     run.world.close()
+    return run, arrival
+
+
+@pytest.mark.parametrize("later", [-0.75, 0.0, 0.75])
+def test_vehicle_brakes_comfortably_for_traffic_from_the_right(later: float) -> None:
+    """A car with the right of way drives straight on; until it is in the junction it could also turn left, across a
+    nearer part of the way of the vehicle. Both would be in the middle of the junction at about the same time."""
+    run, arrival = drive_past_a_car_from_the_right(later)
     speeds = np.array(run.speeds)
     assert ((speeds[:-10] - speeds[10:]) / 0.5).max() < 3.05
     # The car has left the lane before the vehicle reaches its side.
@@ -196,11 +203,7 @@ def test_vehicle_brakes_comfortably_for_traffic_from_the_right(later: float) -> 
 def test_vehicle_slows_down_comfortably_instead_of_stopping(later: float) -> None:
     """A car with the right of way is in the middle of the junction somewhat later than the vehicle would be. With 40 %
     of its speed, which takes 2.4 s with 2 m/s², the vehicle passes behind it."""
-    roads = RoadNetwork.load(ROADS / "four_way_junction.xodr")
-    run = PlannedDrive(behavior(roads, 8.0), roads, speed=8.0, start=-30.0, y=0.0)
-    arrival = 72.0 / 8.0 + later
-    run.run(20.0, lambda now: [KnownBox(43.8, 8.0 * (now - arrival), vy=8.0, yaw=math.pi / 2.0)])
-    run.world.close()
+    run, _ = drive_past_a_car_from_the_right(later)
     speeds = np.array(run.speeds)
     assert ((speeds[:-10] - speeds[10:]) / 0.5).max() < 2.1
     assert speeds.min() == pytest.approx(0.4 * 8.0, abs=0.15)
