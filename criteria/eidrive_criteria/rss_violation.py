@@ -70,13 +70,13 @@ class RssViolation(SurroundedCriterion):
         view = frame.view
         if self.missing:
             self.missing.difference_update(view.names)
-        row = view.rows.get(self.of)
-        if row is None:
+        own = view.rows.get(self.of)
+        if own is None:
             return
         self._ticks += 1
         violated = False
         speeds = np.hypot(view.velocity[:, 0], view.velocity[:, 1])
-        reach = self._model.longest(float(speeds[row]), float(speeds.max()))
+        reach = self._model.longest(float(speeds[own]), float(speeds.max()))
         for relation in self.surroundings.relations(view, self.of, self.others, reach):
             # A body that overlaps from behind is a coupled trailer, or has hit this one.
             behind = relation.ahead < 0.0 and (relation.gap > 0.0 or relation.side_gap == 0.0)

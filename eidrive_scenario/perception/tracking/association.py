@@ -62,10 +62,10 @@ def associate(
     rows: list[int] = []
     columns: list[int] = []
     for group, fits in ((confirmed, inside), (~confirmed, inside), (~confirmed, nearby)):
-        free_rows = np.setdiff1d(np.flatnonzero(group), rows)
+        candidates = np.flatnonzero(group)
         free = np.setdiff1d(np.arange(len(boxes)), columns) if columns else np.arange(len(boxes))
-        for row, column in assign_matrix(cost[free_rows][:, free], fits[free_rows][:, free]):
-            rows.append(int(free_rows[row]))
+        for row, column in assign_matrix(cost[candidates][:, free], fits[candidates][:, free]):
+            rows.append(int(candidates[row]))
             columns.append(int(free[column]))
     return rows, columns
 
