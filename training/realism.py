@@ -17,11 +17,11 @@ import cv2
 import numpy as np
 
 from eidrive_scenario.errors import SettingError
+from eidrive_scenario.perception.learned.detector import INPUT_SIZE
 from eidrive_scenario.perception.learned.image_network import ImageNetwork
 from eidrive_scenario.perception.learned.openimages import SIDE, OpenImagesNetwork
 from training.dataset import Dataset
 from training.image_evaluation import evaluate_dataset
-from training.render_data import STORED
 from training.scoring import EvaluatedImage, Objects, Part, score
 from training.tables import WEATHERS, Table, number
 
@@ -109,7 +109,7 @@ def _by_weather(images: Sequence[EvaluatedImage]) -> Table:
 
 def _by_height(rendered: Sequence[EvaluatedImage], photographs: Mapping[str, list[EvaluatedImage]]) -> Table:
     """Return recall on images of clear weather and, by detector, on photographs, by the height at the input size."""
-    clear = [_at_input_size(image, STORED[1]) for image in rendered if image.weather == "clear"]
+    clear = [_at_input_size(image, INPUT_SIZE[1]) for image in rendered if image.weather == "clear"]
     rows = []
     for kind in KINDS:
         for low, high in HEIGHTS:

@@ -16,6 +16,7 @@ import numpy as np
 from rich.progress import Progress
 
 from eidrive_scenario.base.randomness import generator
+from eidrive_scenario.perception.learned.detector import INPUT_SIZE
 from eidrive_scenario.perception.learned.image_network import resized
 from eidrive_scenario.sensing.camera import ImageSensor
 from eidrive_scenario.world import World
@@ -34,8 +35,6 @@ from training.random_scene import (
     replace_actors,
 )
 
-STORED = (512, 384)
-"""Width and height of stored images: the network input [px]."""
 PER_WORLD = 8
 """Number of images of one place, each with different traffic, camera and weather."""
 QUALITY = 82
@@ -77,7 +76,7 @@ def shot(world: World, place: Place, rng: np.random.Generator) -> Shot:
     labels = mark_readable([*labels, *signal_labels(reading, heads, states)], reading, weather)
     settings = view.settings
     camera = (float(settings.width), float(settings.height), settings.fov, float(view.pose[2, 3]))
-    return Shot(encode(resized(reading.rgb, STORED), QUALITY), camera, weather, labels)
+    return Shot(encode(resized(reading.rgb, INPUT_SIZE), QUALITY), camera, weather, labels)
 
 
 def _inside(view: View, place: Place) -> bool:
@@ -93,11 +92,11 @@ def table(images: list[Shot]) -> dict[str, Any]:
     """Return the columns of a dataset."""
     labels = [(row, label) for row, image in enumerate(images) for label in image.labels]
     camera = np.array([image.camera for image in images])
-    scale = np.array(STORED) / camera[:, :2]
+    scale = np.array(INPUT_SIZE) / camera[:, :2]
     image_row = np.array([row for row, _ in labels], dtype=np.int64)
     box = np.array([label.box for _, label in labels]).reshape(-1, 4)
     return {
-        "size": np.tile(np.array(STORED), (len(images), 1)),
+        "size": np.tile(np.array(INPUT_SIZE), (len(images), 1)),
         "scale": scale,
         "camera": camera,
         "weather": np.array([image.weather.name for image in images]),

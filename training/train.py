@@ -23,6 +23,7 @@ from torch import nn
 
 from eidrive_scenario.base.arrays import Bools
 from eidrive_scenario.experiments.average_precision import Matches, average_precision, best_confidence, match
+from eidrive_scenario.perception.learned.detector import INPUT_SIZE
 from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, suppression_groups
 from eidrive_scenario.perception.learned.networks.ssd import Ssd
 from eidrive_scenario.perception.learned.networks.suppression import suppress
@@ -37,7 +38,6 @@ from training.dataset import Dataset
 from training.losses import default_boxes, ssd_loss, state_rare_objects, yolo_loss
 from training.weight_files import write_card, write_weights
 
-INPUT_SIZE = (512, 384)
 MOST_OBJECTS = 48
 """Maximum number of objects of an image; the farthest are omitted."""
 AVERAGE_DECAY = 0.9995
