@@ -19,6 +19,8 @@ SPACING = 1.0
 """Distance of the sample points of a lane along the reference line [m]."""
 RANGE = 200.0
 """Maximum gap to the actors that are considered, unless a larger one is requested [m]."""
+FARTHEST = 1e9
+"""Maximum of that [m], the largest coordinate of a road file: a distance may be infinite."""
 STEP = 5
 """Number of sample points of a lane per point to which actors are compared."""
 BESIDE = 15.0
@@ -124,7 +126,7 @@ class Relation(NamedTuple):
 class LaneCoordinates:
     """Actors in the coordinates of the lane of one of them.
 
-    Chains of lanes reach at least as far beyond the first road as requested, in multiples of RANGE. They are computed
+    Chains of lanes reach at least as far beyond the first road as requested, in doublings of RANGE. They are computed
     when needed.
     """
 
@@ -196,10 +198,10 @@ class LaneCoordinates:
         """Return the chain of the lane of an actor that moves in a direction of s."""
         road = self._roads.roads[location.road]
         key = LaneKey(location.road, road.section_at(location.s).index, location.lane)
-        multiple = math.ceil(reach / RANGE)
-        chain = self._chains.get((key, direction, multiple))
+        doublings = math.ceil(math.log2(reach / RANGE))
+        chain = self._chains.get((key, direction, doublings))
         if chain is None:
-            chain = self._chains[key, direction, multiple] = self._build(key, direction, multiple * RANGE)
+            chain = self._chains[key, direction, doublings] = self._build(key, direction, RANGE * 2.0**doublings)
         return chain
 
     def _center(self, chain: RoadOfChain, number: str, s: float) -> float:
@@ -302,7 +304,7 @@ class Surroundings:
         row = view.rows.get(of)
         if row is None:
             return
-        boxes, reach = view.plain_boxes, max(reach, RANGE)
+        boxes, reach = view.plain_boxes, min(max(reach, RANGE), FARTHEST)
         own = boxes[row]
         near = [
             other

@@ -68,6 +68,12 @@ def test_actor_far_beside_that_approaches(frame: Any, car: Any, side: float, pas
     assert judge([frame(0.0, {"Ego": car(0, speed=10.0), "Other": other})]).passed is passed
 
 
+def test_infinite_distance_is_never_kept(frame: Any, car: Any) -> None:
+    """10 m/s divided by 2e-310 m/s² is more than a number can be."""
+    places = {"Ego": car(0, speed=10.0), "Other": car(1e6, yaw=math.pi, speed=10.0)}
+    assert not judge([frame(0.0, places)], min_braking=1e-310, min_braking_correct=1e-310).passed
+
+
 def test_standing_ego_causes_no_violation(frame: Any, car: Any) -> None:
     assert judge([frame(0.0, {"Ego": car(0), "Lead": car(5)})]).passed
 
