@@ -66,6 +66,19 @@ def test_speed_change_limited_by_its_jerk_does_not_overshoot(
     assert played.when("action 0", "completeState") == pytest.approx(2.0 * math.sqrt(15.0), abs=0.1)
 
 
+@pytest.mark.parametrize("dt", [0.05, 0.3])
+@pytest.mark.parametrize(("up", "down"), [(21.0, 0.4), (0.1, 1.5), (4.0, 21.0)])
+@pytest.mark.parametrize(("start", "end", "time"), [(33.2, 34.5, 0.0), (30.0, 17.4, 20.0), (39.9, 18.8, 8.0)])
+def test_limited_value_never_passes_its_target(
+    start: float, end: float, time: float, up: float, down: float, dt: float
+) -> None:
+    limited, sign = RateLimitedValue(start, 0.0, up=up, down=down), math.copysign(1.0, end - start)
+    for step in range(1, round(200.0 / dt)):
+        wanted = start + (end - start) * min(step * dt / time, 1.0) if time > 0.0 else end
+        assert sign * (limited.advance(wanted, dt, end) - end) < 1e-6
+    assert limited.rests_at(end, dt)
+
+
 @pytest.mark.element("SpeedAction")
 @pytest.mark.parametrize(
     ("action", "rate", "warning"),

@@ -88,11 +88,12 @@ class RateLimitedValue:
         self.rate = (value - self.value) / dt
         self.value = self._target = value
 
-    def advance(self, wanted: float, dt: float, final: float | None = None) -> float:
+    def advance(self, wanted: float, dt: float, final: float | None = None, *, moves: bool = False) -> float:
         """Return the value dt later, with the target at `wanted` by then.
 
         The target moves on to `final` and stops there, so that the value does not pass it. Without `final` the target
-        keeps its rate. The motion of a target is followed exactly while the bounds allow that.
+        keeps its rate. The motion of a target is followed exactly while the bounds allow that; with
+        `moves`, as it may move on from `final`, also where the value could not stop there.
         """
         target_rate = (wanted - self._target) / dt
         self._target = wanted
@@ -100,7 +101,7 @@ class RateLimitedValue:
         low, high = max(self.rate - self.down * dt, self.lowest), min(self.rate + self.up * dt, self.highest)
         least, most = self._stopping_rates(final, dt)
         settles = -self.down * dt - TINY <= target_rate - exact <= self.up * dt + TINY
-        stops = final == wanted or least - TINY <= exact <= most + TINY
+        stops = moves or least - TINY <= exact <= most + TINY
         if low - TINY <= exact <= high + TINY and settles and stops:
             self.value, self.rate = wanted, exact
             return wanted

@@ -93,7 +93,7 @@ class LaneOffsetAction(ActionBehaviour):
         limited.highest = STEEPEST * abs(self.actor.motion.speed)
         limited.lowest = -limited.highest
         target = self._target(here) * self._way(here)
-        self._offset = limited.advance(target, self.context.dt, final=target)
+        self._offset = limited.advance(target, self.context.dt, final=target, moves=True)
         self.actor.motion.set_lateral_step(LateralStep(self._offset, shortens_distance=False, rate=limited.rate))
 
     def _shape(self) -> model.DynamicsShape:
