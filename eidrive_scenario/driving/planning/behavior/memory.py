@@ -72,8 +72,8 @@ class KnownObject(msgspec.Struct):
     """Time of the last observation [s]."""
     still_since: float | None = None
     """Time since which the object stands [s]; None while it moves."""
-    stands_at: tuple[float, float] = (0.0, 0.0)
-    """Place at which the object has come to stand [m]."""
+    stands_at: tuple[float, float] = (math.inf, math.inf)
+    """Place at which the object has last come to stand [m]; inf if it has not."""
     moving_since: float | None = None
     """Time since which the object moves [s]; None while it stands."""
     hidden_since: float | None = None
@@ -100,6 +100,11 @@ class KnownObject(msgspec.Struct):
     def speed(self) -> float:
         """Speed [m/s]."""
         return math.hypot(self.vx, self.vy)
+
+    @property
+    def moved(self) -> float:
+        """Distance from the place at which it last stood [m]; inf if it never did."""
+        return math.hypot(self.x - self.stands_at[0], self.y - self.stands_at[1])
 
     @property
     def speed_error(self) -> float:
@@ -174,8 +179,7 @@ class KnownObject(msgspec.Struct):
 
         It stands on while it has moved no farther and no faster than the errors of place and velocity explain.
         """
-        moved = math.hypot(self.x - self.stands_at[0], self.y - self.stands_at[1])
-        if self.speed < STILL or (self.seems_to_stand and moved <= uncertainty * self.error):
+        if self.speed < STILL or (self.seems_to_stand and self.moved <= uncertainty * self.error):
             if self.still_since is None:
                 self.stands_at, self.still_since = (self.x, self.y), now
             self.moving_since = None

@@ -47,7 +47,8 @@ AT_SIGN = 1.0
 """Distance of the front from a sign within which the vehicle has stopped there or passes it [m]."""
 SIMILAR_TURN = 0.6
 """Maximum difference to the smallest turn of a vehicle of other turns that are likely [rad]. It is expected to take no
-others if it gives way, and they are no reason for emergency braking before it enters the junction."""
+others if it gives way, and they are no reason for emergency braking before it enters the junction, or while it sets off
+there."""
 HARSH = math.sqrt(7.0 / FASTEST_TURN)
 """Ratio of the speeds in a curve at the limit of the tires (0.7 g) and at that of comfort. A vehicle that has been
 predicted to follow a lane may be that fast."""
@@ -61,7 +62,8 @@ class Prediction(msgspec.Struct, frozen=True):
     objects  (N,) index of the object;  x, y, yaw, speed  (N, K) [m, rad, m/s]
     room     (N,) distance of the center from the nearer edge of the lane that it follows, inf for other objects [m]
     passages  of junctions ahead, for each hypothesis
-    likely    (N,) whether it is no much larger turn in a junction ahead than another hypothesis of the object
+    likely    (N,) whether it is no much larger turn in a junction ahead, or in which the object sets off, than another
+              hypothesis of the object, or shows
     z         (N, K) height of the lower side of the object [m]; None if all roads are level
     """
 
@@ -86,7 +88,7 @@ class Hypothesis(NamedTuple):
     z: Array | None = None
     """Height of the road that it follows (K,) [m]; None: it follows none, or all roads are level."""
     likely: bool = True
-    """Whether it is no much larger turn in a junction ahead than another hypothesis."""
+    """Whether it is no much larger turn than another hypothesis, as in `Prediction`."""
 
 
 class Predictor:
@@ -180,12 +182,13 @@ class Predictor:
         followed: list[Course] = []
         deviations: list[tuple[float, float, float]] = []
         """Lateral speeds from the lanes that it follows [m/s], largest turns with which it gives way to the ego [rad],
-        -inf if it does not, and largest turns in junctions that it has not entered [rad]."""
+        -inf if it does not, and largest turns in junctions that it has not entered, or in which it sets off [rad]."""
         direction = math.atan2(known_object.vy, known_object.vx)
         noise = known_object.speed_error
         # A vehicle that accelerates does so until its driver reacts to a curve.
         soon = now + max(known_object.acceleration, 0.0) * PERCEPTION - noise
         steady = max(LEAVING_RATE, LEAVING_ERROR * known_object.error)
+        sets_off = known_object.moved < known_object.length
         for course in courses:
             along, left, heading = course.project(known_object.x, known_object.y)
             turn = float(wrap_angle(direction - heading))
@@ -223,21 +226,19 @@ class Predictor:
             if fitting is following:
                 followed.append(course)
                 turns = [abs(passage.turn) for passage in ahead if defers is not None and defers(passage)]
-                coming_turns = [abs(passage.turn) for passage in ahead if passage.start > along]
-                deviations.append((abs(aside), max(turns, default=-math.inf), max(coming_turns, default=0.0)))
+                coming = [abs(passage.turn) for passage in ahead if passage.start > along or sets_off]
+                deviations.append((abs(aside), max(turns, default=-math.inf), max(coming, default=0.0)))
             if len(following) == MOST_HYPOTHESES:
                 break
         known_object.followed = followed
         # It is expected to turn before the ego only if it leaves its lane, in the direction of the turn.
         # It may do so if it slows down.
-        usual = min((turn for _, turn, _ in deviations), default=0.0) + SIMILAR_TURN
-        least = min((deviation for deviation, turn, _ in deviations if turn <= usual), default=math.inf)
-        likely = min((coming for *_, coming in deviations), default=0.0) + SIMILAR_TURN
         slows = known_object.acceleration <= -NOTICEABLE
-        expected = [turn <= usual or least > max(steady, deviation) for deviation, turn, _ in deviations]
+        expected = _expected([(deviation, turn) for deviation, turn, _ in deviations], steady)
+        likely = _expected([(deviation, turn) for deviation, _, turn in deviations], steady)
         following = [
-            hypothesis._replace(likely=is_expected and coming <= likely)
-            for hypothesis, is_expected, (*_, coming) in zip(following, expected, deviations, strict=True)
+            hypothesis._replace(likely=is_expected and is_likely)
+            for hypothesis, is_expected, is_likely in zip(following, expected, likely, strict=True)
             if is_expected or slows
         ]
         return following or too_fast or leaving[:MOST_HYPOTHESES] or [_straight_on(known_object, travelled, speed)]
@@ -262,6 +263,17 @@ class Predictor:
         for index, groups in zip(moving, alternatives, strict=True):
             lanes[index] = in_turn(groups)
         return lanes
+
+
+def _expected(turns: list[tuple[float, float]], steady: float) -> list[bool]:
+    """Return which turns are about as small as the smallest one, or show, as the vehicle leaves the lanes of those.
+
+    turns   lateral speeds from the lanes [m/s], and turns along them [rad]
+    steady  lateral speed up to which a vehicle keeps its lane [m/s]
+    """
+    usual = min((turn for _, turn in turns), default=0.0) + SIMILAR_TURN
+    least = min((deviation for deviation, turn in turns if turn <= usual), default=math.inf)
+    return [turn <= usual or least > max(steady, deviation) for deviation, turn in turns]
 
 
 def _straight_on(known_object: KnownObject, travelled: Array, speed: Array) -> Hypothesis:

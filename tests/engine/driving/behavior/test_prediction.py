@@ -275,6 +275,18 @@ def test_each_turn_of_a_vehicle_in_a_junction_is_likely() -> None:
     assert all(prediction.likely)
 
 
+@pytest.mark.parametrize(("moved", "turned", "likely"), [(1.0, 0.0, {0}), (1.0, 0.2, {1}), (6.0, 0.0, {-1, 0, 1})])
+def test_vehicle_that_sets_off_in_a_junction_turns_once_it_shows(moved: float, turned: float, likely: set[int]) -> None:
+    """At 2 m/s, 0.2 rad off the lane straight ahead are 0.4 m/s to the left. The car is 4.5 m long."""
+    roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
+    yaw = math.pi / 2.0 + turned
+    (entry,) = known(KnownBox(43.8, -8.0, 2.0 * math.cos(yaw), 2.0 * math.sin(yaw), yaw=yaw))
+    entry.stands_at = (43.8, -8.0 - moved)
+    prediction = Predictor(roads, TIMES).predict([entry])
+    quarters = np.round((prediction.yaw[:, -1] - math.pi / 2.0) / (math.pi / 2.0))
+    assert set(quarters[list(prediction.likely)].tolist()) == likely
+
+
 @pytest.mark.parametrize(("acceleration", "turns"), [(0.0, True), (1.0, False)])
 def test_vehicle_that_accelerates_beyond_the_speed_of_a_turn_does_not_turn(acceleration: float, turns: bool) -> None:
     """The left turn of a radius of 10 m, passed with 6.3 m/s (4 m/s²), is 8 m after the place of the oncoming car.
