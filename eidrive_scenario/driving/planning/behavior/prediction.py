@@ -91,6 +91,20 @@ class Hypothesis(NamedTuple):
     """Whether it is no much larger turn than another hypothesis, as in `Prediction`."""
 
 
+class _Branch(NamedTuple):
+    """Hypothesis along a lane, with its course and the lateral speed from it [m/s].
+
+    deferring  largest turn with which the object gives way to the ego, -inf if it does not [rad]
+    coming     largest turn in junctions that it has not entered, or in which it sets off [rad]
+    """
+
+    hypothesis: Hypothesis
+    course: Course
+    aside: float
+    deferring: float
+    coming: float
+
+
 class Predictor:
     """Prediction of objects over a road network, or without one."""
 
@@ -174,15 +188,11 @@ class Predictor:
             x, y, yaw, speed = motion[:, None].repeat(len(times), axis=1)
             return [Hypothesis((x, y, yaw), speed)]
         travelled, speed = longitudinal_motion(now, known_object.acceleration, times)
-        following: list[Hypothesis] = []
-        too_fast: list[Hypothesis] = []
-        """Along curves for which the vehicle is too fast: only if it follows no other lane."""
+        following: list[_Branch] = []
+        too_fast: list[_Branch] = []
+        """Along curves for which the vehicle is too fast: only if it follows no other lane, or leaves the others."""
         leaving: list[Hypothesis] = []
         """Along lanes that the vehicle leaves, crosses or is beside of: only if it follows no lane."""
-        followed: list[Course] = []
-        deviations: list[tuple[float, float, float]] = []
-        """Lateral speeds from the lanes that it follows [m/s], largest turns with which it gives way to the ego [rad],
-        -inf if it does not, and largest turns in junctions that it has not entered, or in which it sets off [rad]."""
         direction = math.atan2(known_object.vy, known_object.vx)
         noise = known_object.speed_error
         # A vehicle that accelerates does so until its driver reacts to a curve.
@@ -215,33 +225,38 @@ class Predictor:
             )
             leaves = abs(aside) > wandering and not keeps
             fits = keeps or now <= noise or course.can_follow(along, soon)
-            fitting = leaving if leaves or not is_inside else following if fits else too_fast
             if leaves:
                 offset = left + np.minimum(np.maximum(aside * times, -LANE_WIDTH), LANE_WIDTH)
             way, speeds = _held_by_sign(known_object, course, along, times) or (along_lane, lane_speed)
             room = max(course.half_width - abs(left), 0.0)
             ahead = tuple([passage for passage in course.passages if passage.end > along])
             z = None if self._level else np.interp(along + way, course.along, course.heights)
-            fitting.append(Hypothesis(course.poses(along + way, offset), speeds, room, ahead, z))
-            if fitting is following:
-                followed.append(course)
-                turns = [abs(passage.turn) for passage in ahead if defers is not None and defers(passage)]
-                coming = [abs(passage.turn) for passage in ahead if passage.start > along or sets_off]
-                deviations.append((abs(aside), max(turns, default=-math.inf), max(coming, default=0.0)))
+            hypothesis = Hypothesis(course.poses(along + way, offset), speeds, room, ahead, z)
+            if leaves or not is_inside:
+                leaving.append(hypothesis)
+                continue
+            turns = [abs(passage.turn) for passage in ahead if defers is not None and defers(passage)]
+            coming = [abs(passage.turn) for passage in ahead if passage.start > along or sets_off]
+            deferring = max(turns, default=-math.inf)
+            branch = _Branch(hypothesis, course, abs(aside), deferring, max(coming, default=0.0))
+            (following if fits else too_fast).append(branch)
             if len(following) == MOST_HYPOTHESES:
                 break
-        known_object.followed = followed
+        least = min((branch.aside for branch in following), default=-math.inf)
+        following += [branch for branch in too_fast if least > max(steady, branch.aside)]
+        known_object.followed = [branch.course for branch in following]
         # It is expected to turn before the ego only if it leaves its lane, in the direction of the turn.
         # It may do so if it slows down.
         slows = known_object.acceleration <= -NOTICEABLE
-        expected = _expected([(deviation, turn) for deviation, turn, _ in deviations], steady)
-        likely = _expected([(deviation, turn) for deviation, _, turn in deviations], steady)
-        following = [
-            hypothesis._replace(likely=is_expected and is_likely)
-            for hypothesis, is_expected, is_likely in zip(following, expected, likely, strict=True)
+        expected = _expected([(branch.aside, branch.deferring) for branch in following], steady)
+        likely = _expected([(branch.aside, branch.coming) for branch in following], steady)
+        hypotheses = [
+            branch.hypothesis._replace(likely=is_expected and is_likely)
+            for branch, is_expected, is_likely in zip(following, expected, likely, strict=True)
             if is_expected or slows
         ]
-        return following or too_fast or leaving[:MOST_HYPOTHESES] or [_straight_on(known_object, travelled, speed)]
+        hypotheses = hypotheses or [branch.hypothesis for branch in too_fast] or leaving[:MOST_HYPOTHESES]
+        return hypotheses or [_straight_on(known_object, travelled, speed)]
 
     def lanes(self, objects: list[KnownObject]) -> list[list[Course]]:
         """Return the courses of the lanes on which each moving vehicle is."""

@@ -232,6 +232,25 @@ def test_turn_that_is_faster_than_usual_is_predicted_once_it_shows() -> None:
     assert (prediction.y[:, -1] < -20.0).any()
 
 
+@pytest.mark.parametrize("speed", [6.0, 8.0])
+def test_turn_is_predicted_while_the_lane_ahead_is_hardly_left(speed: float) -> None:
+    """A radius of 10 m is passed with 6.3 m/s comfortably (4 m/s²), and with 8.3 m/s at most (0.7 g).
+
+    At 0.2 rad off the lane straight ahead, less than the 0.3 rad up to which it follows that, it moves along the turn.
+    """
+    roads = RoadNetwork.load(library_path() / "roads" / "four_way_junction.xodr")
+    predictor = Predictor(roads, TIMES)
+    (courses,) = predictor.lanes(known(KnownBox(52.0, 3.5, -speed, yaw=math.pi)))
+    turn = next(course for course in courses if course.points[-1, 1] < -50.0)
+    x, y, heading = turn.poses(np.arange(0.0, 12.0, 0.1), 0.0)
+    index = int((np.unwrap(heading) - np.unwrap(heading)[0] > 0.2).argmax())
+    velocity = speed * math.cos(heading[index]), speed * math.sin(heading[index])
+    (entry,) = known(KnownBox(float(x[index]), float(y[index]), *velocity, yaw=float(heading[index])))
+    (courses,) = predictor.lanes([entry])
+    entry.followed = [course for course in courses if abs(course.points[-1, 1] - 3.5) < 1.0]
+    assert (predictor.predict([entry]).y[:, -1] < -20.0).any()
+
+
 @pytest.mark.parametrize(("turned", "expected"), [(0.0, False), (0.03, False), (0.1, True), (-0.1, False)])
 def test_turn_that_gives_way_is_predicted_once_it_shows(turned: float, expected: bool) -> None:
     """At 6 m/s, 0.03 rad off the lane straight ahead is wandering (0.18 m/s), and 0.1 rad to the left is a turn."""
