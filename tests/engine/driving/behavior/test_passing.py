@@ -8,10 +8,11 @@ import re
 import numpy as np
 import pytest
 from opendrive_xml import map_xml, road_xml
-from planned_drive import LANE, KnownBox, PlannedDrive, behavior, two_lane_road
+from planned_drive import FRONT, LANE, KnownBox, PlannedDrive, behavior, two_lane_road
 from signal_street import CAR
 
 from eidrive_scenario.base.coverage import ViewSector
+from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.planning.behavior.proposals import Start, change_length, passing
 from eidrive_scenario.driving.planning.signal_stops import StopPoint
 from eidrive_scenario.extensions.library import library_path
@@ -55,10 +56,8 @@ def test_row_of_obstacles_is_no_queue_and_passed_without_a_stop() -> None:
     assert min(run.speeds) > 3.0
 
 
-@pytest.mark.parametrize("start", [6.8, 7.8])
-def test_pass_of_a_queue_that_sets_off_is_given_up(start: float) -> None:
-    """The first car hides the second one, which sets off first. The vehicle waits at the edge of its lane until 6.5 s,
-    and is beside the first car at 10 s."""
+def _queue_that_sets_off(start: float) -> PlannedDrive:
+    """Return a drive behind two cars, of which the first one hides the second one, which sets off first, at `start`."""
 
     def car(place: float, time: float) -> KnownBox:
         accelerates = min(max(time, 0.0), 4.0)
@@ -72,9 +71,41 @@ def test_pass_of_a_queue_that_sets_off_is_given_up(start: float) -> None:
     run = PlannedDrive(behavior(roads), roads)
     run.run(20.0, queue)
     run.world.close()
+    assert run.front < queue(20.0)[0].x - 2.25
+    return run
+
+
+@pytest.mark.parametrize("start", [6.8, 7.8])
+def test_pass_of_a_queue_that_sets_off_is_given_up(start: float) -> None:
+    """The vehicle waits at the edge of its lane until 6.5 s, and is beside the first car at 10 s."""
+    run = _queue_that_sets_off(start)
     assert any("pass car" in plan.reason for plan in run.plans[130:])
     assert max(y for _, y, _ in run.path) + CAR.size[1] / 2.0 < 0.1, "in its lane, within the error of the control"
-    assert run.front < queue(20.0)[0].x - 2.25
+
+
+@pytest.mark.parametrize(("start", "gives_up"), [(7.8, True), (8.8, False)])
+def test_pass_of_a_queue_ends_where_comfortable_braking_suffices(start: float, *, gives_up: bool) -> None:
+    """At v the vehicle stops within v² / (2 · 2 m/s²). The second car moves, with 0.5 m/s, 0.23 s after it sets off."""
+    run = _queue_that_sets_off(start)
+    x, _, speed = run.path[round((start + 0.5 / 2.2) / 0.05)]
+    rear = 80.0 - 2.25
+    assert (x + FRONT + speed**2 / (2.0 * 2.0) < rear) is gives_up
+    # In the decision after that, 0.1 s later.
+    assert ("pass car" not in run.reasons[round((start + 0.5) / 0.05)]) is gives_up
+
+
+def test_standing_car_is_passed_once_what_it_may_wait_behind_is_considered() -> None:
+    """At 30 m/s the window ends after 8 s and 40 m, 280 m ahead of the vehicle. A queue has gaps of up to 15 m.
+
+    A maneuver begins when it has been the best one for 0.5 s.
+    """
+    roads = two_lane_road(1200.0)
+    run = PlannedDrive(behavior(roads, 30.0), roads, speed=30.0)
+    run.run(6.0, lambda now: [KnownBox(400.0)], goal=Goal(waypoints=np.array([[1100.0, LANE, 0.0]])))
+    run.world.close()
+    begins = next(number for number, reason in enumerate(run.reasons) if "pass" in reason)
+    to_front = 400.0 + 2.25 - run.path[begins][0]
+    assert 280.0 - 15.0 - 30.0 * (0.5 + 0.2) < to_front < 280.0 - 15.0
 
 
 def test_queue_at_a_light_may_be_passed_a_time_after_green(monkeypatch: pytest.MonkeyPatch) -> None:
