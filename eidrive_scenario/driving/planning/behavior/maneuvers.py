@@ -393,8 +393,8 @@ def _in_return(situation: Situation, scene: Surroundings, profile: LateralProfil
 
 
 def shortened(situation: Situation, scene: Surroundings, profile: LateralProfile) -> LateralProfile | None:
-    """Return a profile past an obstacle with its way back before what stands behind that; None if nothing does, without
-    space for it, or if the vehicle returns already."""
+    """Return a profile past an obstacle with its way back before what stands behind that, on the route or in the lane
+    that the vehicle uses; None if nothing does, without space for it, or if the vehicle returns already."""
     if len(profile.places) < 3 or profile.last != 0.0:
         return None
     *_, before, end, back = profile.places
@@ -408,7 +408,7 @@ def shortened(situation: Situation, scene: Surroundings, profile: LateralProfile
         if end < hypothesis.rear - overhang < back
         and abs(hypothesis.speed) < WAITING
         and not hypothesis.crosses
-        and _is_in_way(situation, hypothesis)
+        and (_is_in_way(situation, hypothesis) or _is_in_way(situation, hypothesis, value))
     ]
     if not rears:
         return None
@@ -528,9 +528,9 @@ def _border(lanes: LanesBeside, side: int, half_width: float) -> float:
     return own - half_width - INSIDE if every > own else math.inf
 
 
-def _is_in_way(situation: Situation, hypothesis: Present) -> bool:
-    """Return whether a hypothesis is closer to the route than the vehicle on it should pass."""
-    return abs(hypothesis.d) - hypothesis.half_width < situation.body.half_width + hypothesis.margin
+def _is_in_way(situation: Situation, hypothesis: Present, offset: float = 0.0) -> bool:
+    """Return whether a hypothesis is closer to an offset from the route [m] than the vehicle there should pass."""
+    return abs(hypothesis.d - offset) - hypothesis.half_width < situation.body.half_width + hypothesis.margin
 
 
 def _blocker(situation: Situation, scene: Surroundings) -> Present | None:

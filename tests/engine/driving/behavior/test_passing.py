@@ -170,6 +170,28 @@ def test_pass_ends_behind_parked_cars_that_come_into_view() -> None:
     assert min(speed for place, _, speed in run.path if 80.0 < place < 112.0) > 3.0
 
 
+def test_vehicle_returns_before_an_oncoming_car_that_has_stopped_for_it() -> None:
+    """The car brakes from 9 m/s with 1.8 m/s², and stands 19 m behind a truck from 9 s on.
+
+    From standstill 59 m before, the front of the vehicle is at 130 m after 8.8 s with 1.5 m/s².
+    """
+    truck, front = KnownBox(100.0, kind="truck", size=(8.0, 2.5)), 104.0 + 19.0
+
+    def objects(now: float) -> list[KnownBox]:
+        left = max(9.0 - 1.8 * max(now - 4.0, 0.0), 0.0)
+        way = left**2 / (2.0 * 1.8) + 9.0 * max(4.0 - now, 0.0)
+        return [truck, KnownBox(front + 2.25 + way, 1.75, vx=-left, yaw=math.pi)]
+
+    roads = two_lane_road()
+    planner = behavior(roads)
+    planner.view = (ViewSector(0.0, 0.0, 1.8, 0.0, math.pi, 120.0),)
+    run = PlannedDrive(planner, roads)
+    run.run(18.0, objects)
+    run.world.close()
+    assert run.front > 130.0
+    assert min(run.least_distance(body) for body in objects(18.0)) > 0.4
+
+
 def test_vehicle_returns_behind_cones_between_the_lanes() -> None:
     """Cones lead out of the lane, which is free behind them, and for 25 m on between the lanes, one every 5 m."""
     closing = [KnownBox(80.0 + 4.0 * number, LANE * (2.0 - number / 4.0)) for number in range(8)]
