@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import pytest
 from recorded_scene import RunScene
-from storyboard_xml import lane_position_xml, speed_xml, teleport_xml, world_position_xml
+from storyboard_xml import element_state_xml, lane_position_xml, speed_xml, teleport_xml, world_position_xml
 from street_scene import NOTHING, OPENING, after
 from trajectories import CORNER, follow_points
 from whole_run import Run
@@ -53,6 +53,19 @@ def test_lane_change_offset_follows_its_shape(scene: RunScene, shape: str, quart
     assert played.at(4.0).y == pytest.approx(-6.0)
     assert (played.at(4.1).y, played.at(4.1).yaw) == pytest.approx((-6.0, 0.0))
     assert played.when("action 0", "completeState") == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize("mode", ["position", "follow"])
+@pytest.mark.parametrize(
+    "trigger",
+    [after(0.95), *(element_state_xml("event", "event 1", state) for state in ("startTransition", "completeState"))],
+)
+def test_lane_change_by_a_chain_ends_a_trajectory_in_its_lane(scene: RunScene, mode: str, trigger: str) -> None:
+    """As if it started directly at 1 s: 4 m linearly in 4 s."""
+    ahead = follow_points([(100.0, -2.0, None), (900.0, -2.0, None)], mode)
+    played = scene(6, ("Ego", ahead), ("Ego", NOTHING, after(0.95)), ("Ego", change(lane(-2)), trigger))
+    for time, y in ((1.0, -2.0), (1.1, -2.1), (3.0, -4.0), (5.0, -6.0), (6.0, -6.0)):
+        assert played.at(time).y == pytest.approx(y)
 
 
 def test_lane_change_path_length_is_that_of_the_speed(scene: RunScene) -> None:

@@ -4,11 +4,13 @@
 
 1. Actions that the last step completed end, and with them, bottom up, the elements whose children are complete.
 2. Triggers are evaluated, and stop and start elements, top down.
-3. `update_children` lets each running action decide on the next step, once per tick. Actions that only set a value end.
+3. `update_children` updates the actions that only set a value, which end, and ends the elements that are complete.
+4. All other running actions decide on the next step, once per tick.
 
-Steps 2 and 3 repeat while a state changes, so that a chain of elements is executed in one tick: transitions consume no
-simulation time (ASAM OpenSCENARIO XML 1.3.1, 8.3.1). An element starts at most once in a tick, which bounds the loop.
-Until a state changes, they visit the elements that wait for a trigger, and the running actions only.
+Steps 2 and 3 repeat until no state changes, so that a chain of elements is executed in one tick: transitions consume no
+simulation time (ASAM OpenSCENARIO XML 1.3.1, 8.3.1), and an action that the chain stops moves nothing in this tick. All
+steps repeat if step 4 changes a state, as by the removal of an entity. An element starts at most once in a tick, which
+bounds the loop. Until a state changes, they visit the elements that wait for a trigger, and the running actions only.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -29,6 +32,16 @@ NO_TRIGGER = "it has no start trigger"
 """Reason for the start of an element without a start trigger."""
 ALWAYS = Trigger(())
 """Trigger of an element that starts with its parent; it does not rest."""
+
+
+class RunningAction(Protocol):
+    """Action in runningState."""
+
+    def update_children(self) -> None:
+        """Update the behaviours of an action that only sets a value."""
+
+    def decide(self) -> None:
+        """Update the behaviours, once per tick."""
 
 
 class StoryElement(Composite):
@@ -72,7 +85,7 @@ class StoryElement(Composite):
         if self.limit < 1:
             self._change(ElementTransition.SKIP, ElementState.COMPLETE, "maximumExecutionCount is 0")
 
-    def list_active(self, awaited: list[tuple[StoryElement, Trigger]], actions: list[StoryElement]) -> None:
+    def list_active(self, awaited: list[tuple[StoryElement, Trigger]], actions: list[RunningAction]) -> None:
         """Add the elements from this one down that await a trigger, and the running actions, to the lists, top down."""
         state = self.record.state
         if state is ElementState.STANDBY:
@@ -186,7 +199,7 @@ class StoryboardElement(StoryElement):
     _listed = _updated = -1
     """Number of state changes before the lists of elements were made, and before all elements were updated."""
     _awaited: Sequence[tuple[StoryElement, Trigger]] = ()
-    _running_actions: Sequence[StoryElement] = ()
+    _running_actions: Sequence[RunningAction] = ()
 
     def tick_tree(self, init: Behaviour | None = None) -> None:
         """Tick the tree, and the actions of Init that are running."""
@@ -198,13 +211,13 @@ class StoryboardElement(StoryElement):
         if self.context.completes_this_step:
             self.context.completes_this_step = False
             self.complete_finished()
-        seen = -1
+        seen = awaiting = -1
         while seen != len(progress.changes):
             seen = len(progress.changes)
             if self._listed != progress.version:
                 self._listed = progress.version
                 awaited: list[tuple[StoryElement, Trigger]] = []
-                actions: list[StoryElement] = []
+                actions: list[RunningAction] = []
                 self.list_active(awaited, actions)
                 self._awaited, self._running_actions = awaited, actions
             version = progress.version
@@ -220,14 +233,23 @@ class StoryboardElement(StoryElement):
                 continue  # Elements start once no further one stops.
             self._start_elements(due)
             moved, time = set(), math.nan  # Motion and time are constant within a tick.
+            self.update_children()
+            if seen != len(progress.changes):
+                continue
             if init is not None:
                 init.tick_once()
                 init = None
-            self.update_children()
-            if seen == len(progress.changes):
-                pending, self.context.pending_actions = self.context.pending_actions, []
-                for abort in pending:
-                    abort()
+            for action in self._running_actions:
+                action.decide()
+                if seen != len(progress.changes):
+                    break
+            pending, self.context.pending_actions = self.context.pending_actions, []
+            if pending and seen == len(progress.changes):
+                if len(pending) != awaiting:
+                    awaiting, seen = len(pending), -1  # An action of this tick may have added their entity.
+                else:
+                    for abort in pending:
+                        abort()
 
     def _stop_elements(self, elements: Sequence[StoryElement]) -> bool:
         """Stop elements by their triggers, which are evaluated together before; return whether one stops."""

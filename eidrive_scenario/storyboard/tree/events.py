@@ -10,7 +10,7 @@ from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour
 from eidrive_scenario.storyboard.context.contexts import EntityUnavailableError
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
 from eidrive_scenario.storyboard.state.element_states import ElementState, ElementTransition
-from eidrive_scenario.storyboard.tree.elements import StoryElement, TriggeringEntities
+from eidrive_scenario.storyboard.tree.elements import RunningAction, StoryElement, TriggeringEntities
 from eidrive_scenario.storyboard.tree.trigger import Trigger, WaitForTrigger
 
 
@@ -108,6 +108,7 @@ class ActionElement(StoryElement):
         """Behaviours that start at this instant and await an entity that may enter the world, or be
         disconnected, at this instant."""
         self._decided_at: int | None = None
+        self._sets_value = False
         for actor in self.actors:
             self.add_children(list(self.behaviours(actor)))
         for name in triggering.candidates if triggering is not None else ():
@@ -136,6 +137,7 @@ class ActionElement(StoryElement):
         for behaviour in [behaviour for behaviour in self.running if behaviour.status is Status.SUCCESS]:
             self.running.remove(behaviour)
             self.context.release_domains(behaviour)
+        self._sets_value = all(behaviour.immediate for behaviour in self.running)
         if not self.running and not actors:
             self._change(ElementTransition.END, ElementState.COMPLETE)
 
@@ -188,22 +190,27 @@ class ActionElement(StoryElement):
             completing, self._completing = self._completing, []
             self._end_behaviours(completing)
 
-    def list_active(self, awaited: list[tuple[StoryElement, Trigger]], actions: list[StoryElement]) -> None:
+    def list_active(self, awaited: list[tuple[StoryElement, Trigger]], actions: list[RunningAction]) -> None:
         """Add the action to the running ones if it is running."""
         if self.record.state is ElementState.RUNNING:
             actions.append(self)
 
     def update_children(self) -> None:
-        """Update the behaviours once per tick; those that reach their goals end at the end of the step."""
+        """Update the behaviours of an action that only sets a value."""
         self.status = Status.RUNNING
+        if self._sets_value:
+            self.decide()
+        if self.state is ElementState.COMPLETE:
+            self.status = Status.SUCCESS
+
+    def decide(self) -> None:
+        """Update the behaviours once per tick; those that reach their goals end at the end of the step."""
         now = self.context.progress.tick
         if self._decided_at != now:
             self._decided_at = now
             self._update_all(self.running)
         elif self._awaiting:
             self._update_all(list(self._awaiting))
-        if self.state is ElementState.COMPLETE:
-            self.status = Status.SUCCESS
 
     def _update_all(self, behaviours: Sequence[ActionBehaviour]) -> None:
         done: list[ActionBehaviour] = []

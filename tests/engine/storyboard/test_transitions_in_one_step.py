@@ -224,3 +224,31 @@ def test_view_conditions_are_evaluated_once_per_step(clock: Any, script: Any, co
             [False] * 3 if condition is watching else [False, True, True]
         )
     assert (watching.asked, looking.asked) == (1, 3)
+
+
+@pytest.mark.parametrize("order", [list, reversed])
+@pytest.mark.parametrize(
+    ("chained", "tick", "speed"),
+    [
+        (time_xml(0.25), 3, 18.7),
+        (ended("note"), 3, 18.7),
+        (ended("note", "startTransition"), 3, 18.7),
+        (ended("note", "completeState"), 3, 18.7),
+        (ended("slower", "startTransition"), 1, 20.5),
+        (ended("slower", "runningState"), 1, 20.5),
+    ],
+)
+def test_action_that_a_chain_preempts_moves_nothing_in_this_step(
+    build: Any, order: Any, chained: str, tick: int, speed: float
+) -> None:
+    """20 m/s, to 10 m/s in 1 s from 0.1 s on: 18 m/s at 0.3 s. To 25 m/s in 1 s: 18 + 7 · 0.1, or 20 + 5 · 0.1."""
+    events = [
+        event("slower", when(time_xml(0.05)), speed_xml(10, 1.0)),
+        event("note", when(time_xml(0.25))),
+        event("faster", when(chained), speed_xml(25, 1.0)),
+    ]
+    storyboard = build(PLACE + speed_xml(20), "".join(order(events)))
+    storyboard.initial()
+    for now in range(tick + 1):
+        commands = storyboard.tick(replace(storyboard.context.view, time=now * 0.1, tick=now))
+    assert commands.placements["A"].speed == pytest.approx(speed)
