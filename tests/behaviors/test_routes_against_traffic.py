@@ -97,3 +97,11 @@ def test_route_with_the_traffic_of_a_wrong_way_driver_is_unchanged(run: Run) -> 
         1.0, ("Ego", assign((4, 180.0), (1, 10.0))), street=merge(), ego=(1, 20.0, 1.0), driven=False, init=init
     )
     assert not [str(one) for one in played.result.warnings if "against the driving direction" in str(one)]
+
+
+def test_error_of_a_wrong_way_driver_leads_from_the_driver(run: Run) -> None:
+    """No way leads from the oncoming lane, in which Ego overtakes, to its own lane."""
+    init = init_xml("Ego", teleport_xml(lane_position_xml(1, 100.0, 1, TURNED)))
+    action = acquire(1, 300.0).replace('laneId="1"', 'laneId="-1"')
+    with pytest.raises(ScenarioError, match=r"from road '1' lane 1 s 100\.0 to road '1' lane -1 s 300\.0"):
+        run(1.0, ("Ego", action), ego=(1, 100.0, 10.0), driven=False, init=init)

@@ -131,10 +131,13 @@ class AcquirePositionAction(ActionBehaviour):
         """Return the route to a location, if need be against the traffic. Raise RouteError if there is none."""
         try:
             return roads.route(here, there)
-        except RouteError:
+        except RouteError as error:
             if not moves_against_traffic(self):
                 raise
-            route = roads.route(here, there, against_traffic=True)
+            try:
+                route = roads.route(here, there, against_traffic=True)
+            except RouteError:
+                raise error from None
             warn_of_wrong_way(self, "the way to the position")
             return route
 
