@@ -7,8 +7,9 @@ from itertools import pairwise
 
 import pytest
 from opendrive_xml import elevation_xml, map_xml, road_xml
+from openscenario_xml import round_car_xml
 from recorded_scene import RunScene
-from storyboard_xml import element_state_xml, init_xml, speed_xml, teleport_xml
+from storyboard_xml import element_state_xml, global_xml, init_xml, speed_xml, teleport_xml
 from street_scene import NOTHING, after
 from trajectories import curve, follow, on_road, world
 from whole_run import RecordedRun, Run
@@ -231,6 +232,22 @@ def test_synchronize_started_with_the_trajectory_measures_along_it(run: Run, tra
     )
     arrived = next(f.view.time for f in played.frames if row(played, f.view.time, "Walker", 0.01)[1] >= -2.39)
     assert arrived == pytest.approx(46.0 / 8.333, abs=0.03)
+
+
+@pytest.mark.parametrize("mode", ["position", "follow"])
+@pytest.mark.parametrize("order", ["speed follow", "follow speed", "follow speed add", "speed follow add"])
+def test_trajectory_of_an_absent_vehicle_adds_it_at_its_start(run: Run, mode: str, order: str) -> None:
+    """At 1 s it enters at x = 150, the next view shows it there, and it moves on at 10 m/s: 150 + 10 (t - 1.05)."""
+    add = f"<AddEntityAction><Position>{world(140.0, -2.0)}</Position></AddEntityAction>"
+    parts = {
+        "speed": speed_xml(10.0),
+        "follow": follow(AHEAD, mode),
+        "add": global_xml(f'<EntityAction entityRef="New">{add}</EntityAction>'),
+    }
+    steps = [("New", parts[name], after(0.975)) for name in order.split()]
+    played = run(2.0, *steps, driven=False, ego=(-2, 500.0, 0.0), more=round_car_xml("New"))
+    for time in (1.05, 1.1, 2.0):
+        assert row(played, time, "New") == pytest.approx((150.0 + 10.0 * (time - 1.05), -2.0, 0.0, 10.0), abs=1e-6)
 
 
 def test_trajectory_end_off_the_road_continues_straight(run: Run) -> None:

@@ -225,7 +225,8 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._begun = True
         self._update_heading()
         vehicle = self.actor.entity
-        if self._follows_limits and self._put is None and isinstance(vehicle, model.Vehicle):
+        drives = self._follows_limits and self._put is None and self.actor.present
+        if drives and isinstance(vehicle, model.Vehicle):
             if self._timing is not None:
                 self._s = self._offset()
             self._pursuit = PathPursuit(layout, self._s, motion.pose, largest_curvature(vehicle), wheelbase_of(vehicle))
