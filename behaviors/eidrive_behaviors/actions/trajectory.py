@@ -183,7 +183,9 @@ class FollowTrajectoryAction(ActionBehaviour):
         self._put: Pose | None = None
         self._driven = None
         self._pursuit = self._run = None
-        self._begun = self._direction_known = self._teleports = self._is_late = False
+        self._direction_known = self._jumps = self._is_late = False
+        self._begun_after = -1
+        """Number of teleports of the actor before `_begin`, which a later teleport repeats; -1 requires it."""
         if self._timing is not None and not (self._follows_limits and present):
             self._s = self._timed_place(self._clock(0.0))
 
@@ -220,9 +222,9 @@ class FollowTrajectoryAction(ActionBehaviour):
             self.actor.motion.set_backing(self._forwards(self._s) * self._progress.way < 0.0)
 
     def _begin(self) -> None:
-        """Prepare the first step from the actor's current pose."""
+        """Prepare the first step from the actor's current pose, and the first one after a teleport."""
         motion, layout = self.actor.motion, self._layout
-        self._begun = True
+        self._begun_after = -1 if motion.teleported else motion.teleports  # This step shows the place of the teleport.
         self._update_heading()
         vehicle = self.actor.entity
         drives = self._follows_limits and self._put is None and self.actor.present
@@ -238,7 +240,7 @@ class FollowTrajectoryAction(ActionBehaviour):
                 behind = self._timed_place(self._clock(0.0)) - self._run.value
                 self._is_late = abs(behind) > TELEPORT_DISTANCE
         start = layout.at(self._s)
-        self._teleports = math.hypot(start.x - motion.pose.x, start.y - motion.pose.y) > TELEPORT_DISTANCE
+        self._jumps = math.hypot(start.x - motion.pose.x, start.y - motion.pose.y) > TELEPORT_DISTANCE
 
     def _determine_direction(self) -> None:
         """Decide whether the actor moves tail first, as soon as it moves."""
@@ -279,7 +281,7 @@ class FollowTrajectoryAction(ActionBehaviour):
         if actor.driven:
             return self._set_driver_goal()
         motion, dt, layout = actor.motion, self.context.dt, self._layout
-        if dt > 0.0 and not self._begun:
+        if dt > 0.0 and self._begun_after != motion.teleports:
             self._begin()
         if dt > 0.0 and not self._direction_known:
             self._determine_direction()
@@ -310,8 +312,8 @@ class FollowTrajectoryAction(ActionBehaviour):
             self._enter(pose)
         else:
             rail = None if self._timing is not None else partial(self._pose_after_distance, before)
-            motion.move_to(pose, land=done, jump=self._teleports, rail=rail)
-        self._teleports = False
+            motion.move_to(pose, land=done, jump=self._jumps, rail=rail)
+        self._jumps = False
         return Status.SUCCESS if done else Status.RUNNING
 
     def _leaves(self, before: float, after: float) -> bool:
@@ -341,8 +343,8 @@ class FollowTrajectoryAction(ActionBehaviour):
     def _drive(self, pursuit: PathPursuit | None) -> Status:
         """Set the pose of a vehicle in the following mode `follow` at the end of the step."""
         motion, dt, layout = self.actor.motion, self.context.dt, self._layout
-        if pursuit is None or dt == 0.0:
-            return Status.RUNNING
+        if pursuit is None or dt == 0.0 or motion.teleported:
+            return Status.RUNNING  # The step of a teleport covers no distance.
         way, before = self._progress.way, pursuit.s
         if self._run is not None:
             clock = self._clock(dt)
