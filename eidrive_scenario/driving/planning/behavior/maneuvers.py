@@ -442,7 +442,8 @@ def _evasions(situation: Situation, scene: Surroundings, head_on: Present) -> li
     """Return changes to the neighboring lanes that reach as far as an oncoming vehicle, and are free behind, and
     motions past an oncoming cyclist or pedestrian.
 
-    The first lane is away from those of the opposite direction.
+    The first lane is away from those of the opposite direction; to each the hasty change comes after the comfortable
+    one, which is then the choice between equals.
     """
     here, there = situation.lanes_ahead, situation.line.lanes_beside(head_on.s)
     evasions = []
@@ -455,7 +456,8 @@ def _evasions(situation: Situation, scene: Surroundings, head_on: Present) -> li
         if math.isnan(offset) or math.isnan(beyond):
             continue
         if has_gap_now(scene, offset, situation.motion, situation.body):
-            evasions.append(to_lane(offset, situation.start, situation.settings.lateral_acceleration))
+            lateral = situation.settings.lateral_acceleration
+            evasions += [to_lane(offset, situation.start, share * lateral) for share in (1.0, HASTY)]
     return evasions
 
 

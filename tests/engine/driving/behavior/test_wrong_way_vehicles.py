@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from opendrive_xml import lanes_xml, map_xml, road_xml
-from planned_drive import LANE, KnownBox, PlannedDrive, behavior, two_lane_road
+from planned_drive import FRONT, LANE, KnownBox, PlannedDrive, behavior, detections, two_lane_road
 from signal_street import CAR
 
+from eidrive_scenario.base.requests import Goal
+from eidrive_scenario.driving.step import Plan
 from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.sensing.readings import EgoState
 
 Traffic = Callable[[float], KnownBox]
 WIDTH, SPEED = 3.5, 20.0
@@ -68,6 +72,36 @@ def test_vehicle_without_a_neighboring_lane_stands_before_the_collision() -> Non
     gaps = [wrong_way(tick * 0.05).x - x - CAR.offset[0] for tick, (x, _, _) in enumerate(run.path)]
     contact = next(tick for tick, gap in enumerate(gaps) if gap < (CAR.size[0] + 4.5) / 2.0)
     assert max(run.speeds[contact - 20 : contact]) < 0.1
+
+
+def plans(*gaps: float) -> list[Plan]:
+    """Return plans every 0.1 s, at 10 m/s in the left one of two lanes.
+
+    gaps  to the wrong-way car [m]; inf if that is out of view
+    """
+    roads = RoadNetwork.parse(map_xml(road_xml(length=500.0, lanes=lanes_xml(1, 2))))
+    planner, made = behavior(roads), list[Plan]()
+    for tick, gap in enumerate(gaps):
+        now, x = 0.1 * tick, 20.0 + tick
+        car = KnownBox(x + FRONT + gap + 2.25, vx=-SPEED, yaw=math.pi)
+        ego = EgoState(now, np.array([x, LANE, 0.0]), 0.0, 0.0, 0.0, 10.0, 0.0, 0.0)
+        made.append(planner.plan(ego, detections(now, *([car] if math.isfinite(gap) else [])), Goal(), now))
+    return made
+
+
+@pytest.mark.parametrize(("gap", "lateral_acceleration"), [(48.0, 4.0), (80.0, 2.0)])
+def test_change_is_hasty_only_where_the_wrong_way_driver_is_near(gap: float, lateral_acceleration: float) -> None:
+    """A change by 3.5 m takes √(5.774 · 3.5 m / a): 3.2 s with 2 m/s², and 2.2 s with 4 m/s².
+
+    The sides are apart (1.82 m and 0.1 m) after 53 % of it, at the rear axle 0.2 s later: after 1.9 s or 1.4 s. At
+    30 m/s that is 56 m or 41 m.
+    """
+    (plan,) = plans(gap)
+    assert plan.reason == "change lane to the right; keep speed"
+    x, y = plan.points.T
+    lateral = np.gradient(np.gradient(y, x), x) * 10.0**2
+    assert np.abs(lateral).max() == pytest.approx(lateral_acceleration, rel=0.05)
+    assert y[-1] == pytest.approx(LANE - WIDTH, abs=0.01)
 
 
 def test_lane_is_kept_if_lane_changes_are_switched_off() -> None:
