@@ -586,7 +586,8 @@ class Decider:
     def _kept(self, options: Options, best: int, now: float) -> int:
         """Return the best proposal; that of the current maneuver during its dwell time, unless it is risky.
 
-        Another maneuver has to be the best one for some time, so that noise of velocities does not start it.
+        Another maneuver has to be the best one for some time, so that noise of velocities does not start it, unless the
+        current one has to brake as in an emergency meanwhile.
         """
         if self._current is None:
             return best
@@ -600,8 +601,11 @@ class Decider:
         if is_due or all(option.profile.name != name for option in options.options):
             return best
         kept = options.best(name=name)
-        is_refused = options.options[kept].proposal.profile in options.refused
-        return best if is_refused or options.collides(kept) else kept
+        proposal = options.options[kept].proposal
+        is_risky = proposal.profile in options.refused or options.collides(kept)
+        # A best option that brakes as hard, or collides as well, is no way out.
+        saves = proposal.is_emergency and not options.options[best].proposal.is_emergency and not options.collides(best)
+        return best if is_risky or saves else kept
 
     def _decision(self, situation: Situation, options: Options, best: int) -> Decision:
         proposal, profile = options.options[best].proposal, options.options[best].profile

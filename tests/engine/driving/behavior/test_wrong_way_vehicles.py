@@ -104,6 +104,14 @@ def test_change_is_hasty_only_where_the_wrong_way_driver_is_near(gap: float, lat
     assert y[-1] == pytest.approx(LANE - WIDTH, abs=0.01)
 
 
+def test_free_lane_is_taken_at_once_instead_of_an_emergency_stop() -> None:
+    """A stop takes 10²/2a + 20 · 10/a m, with the way of the car: 62.5 m with the hard 4 m/s², and 50 m with 5 m/s².
+
+    The change needs 41 m.
+    """
+    assert plans(math.inf, 52.0)[-1].reason == "change lane to the right; keep speed"
+
+
 def test_lane_is_kept_if_lane_changes_are_switched_off() -> None:
     run = drive(2, 1, lane_changes=False)
     assert max(abs(y - LANE) for _, y, _ in run.path) < 0.1
