@@ -318,7 +318,7 @@ def passing_profiles(
     beside = situation.lanes_ahead
     faster, overtaking = beside.faster, beside.overtaking
     # The vehicle does not stop at the end of its route in the lane of the opposite direction.
-    may_cross = obstacle is not None and obstacle.end < situation.end
+    may_cross = obstacle is not None and obstacle.end < situation.end and not _jams(situation, scene, blocker)
     if not _is_parked(situation, blocker):
         profile = None if obstacle is None or not may_cross else _around(situation, scene, obstacle, overtaking)
         return profiles if profile is None or not profile.uses_oncoming else [*profiles, profile]
@@ -599,9 +599,7 @@ def _queues(situation: Situation, scene: Surroundings, blocker: Present) -> bool
     """Return whether the blocker waits at a place where the vehicle stops as well, or behind another vehicle."""
     if situation.stop is not None and situation.stop.s < blocker.s + NEAR_STOP:
         return True
-    known_object = situation.objects[blocker.owner]
-    since, may_queue = known_object.still_since, known_object.kind != "misc" and known_object.kind not in ON_FOOT
-    if not may_queue or since is None or situation.now - max(since, situation.released) >= QUEUE_PATIENCE:
+    if not _stands_in_traffic(situation, blocker, QUEUE_PATIENCE):
         return False
     if _is_beside(situation, blocker):
         return False
@@ -612,6 +610,31 @@ def _queues(situation: Situation, scene: Surroundings, blocker: Present) -> bool
         -0.5 < hypothesis.rear - blocker.front < QUEUE_GAP and abs(hypothesis.d - blocker.d) < 1.0
         for hypothesis in scene.present
     )
+
+
+def _jams(situation: Situation, scene: Surroundings, blocker: Present) -> bool:
+    """Return whether the traffic of a neighboring lane of the direction queues as well, beside the blocker and farther.
+
+    The lanes of the opposite direction are not for passing it as long as a queue is not passed, over a solid line not
+    at all.
+    """
+    lanes = situation.line.lanes_beside(blocker.s)
+    patience = math.inf if lanes.has_solid_line else QUEUE_PATIENCE
+    if not _stands_in_traffic(situation, blocker, patience) or _is_beside(situation, blocker):
+        return False
+    return any(
+        -0.5 < hypothesis.rear - blocker.front < QUEUE_GAP
+        and (abs(hypothesis.d - lanes.left) < 1.0 or abs(hypothesis.d - lanes.right) < 1.0)
+        and _stands_in_traffic(situation, hypothesis, math.inf)
+        for hypothesis in scene.present
+    )
+
+
+def _stands_in_traffic(situation: Situation, hypothesis: Present, patience: float) -> bool:
+    """Return whether an object is a vehicle that has stood for less than a time [s], not counted before green."""
+    known_object = situation.objects[hypothesis.owner]
+    since, is_vehicle = known_object.still_since, known_object.kind != "misc" and known_object.kind not in ON_FOOT
+    return is_vehicle and since is not None and situation.now - max(since, situation.released) < patience
 
 
 def _obstacle(situation: Situation, scene: Surroundings, blocker: Present) -> _Obstacle | None:

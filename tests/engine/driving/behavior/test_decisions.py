@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
+from opendrive_xml import lane_xml, map_xml, road_xml, section_xml
 from planned_drive import FRONT, LANE, KnownBox, PlannedDrive, behavior, detections, two_lane_road
 from signal_street import CAR
 
@@ -145,6 +146,20 @@ def test_standing_queue_is_not_passed(roads: RoadNetwork) -> None:
     run = drive(roads, lambda now: [KnownBox(100.0), KnownBox(107.0), KnownBox(114.0)], 18.0)
     assert run.front < 97.75
     assert run.speeds[-1] < 0.1
+
+
+@pytest.mark.parametrize(("mark", "passes"), [("solid solid", False), ("solid broken", True)])
+def test_jam_in_both_own_lanes_is_not_passed_over_a_solid_line(mark: str, passes: bool) -> None:
+    """The first car of the own lane hides the others. The vehicle, which stands, takes them for a queue for 20 s."""
+    lanes = section_xml(lane_xml(1), lane_xml(-1) + lane_xml(-2), center=f'<roadMark sOffset="0" type="{mark}"/>')
+    planner = behavior(RoadNetwork.parse(map_xml(road_xml(length=400.0, lanes=lanes))), period=1.0)
+    jam = [KnownBox(60.0), *(KnownBox(60.0 + 8.0 * number, LANE - 3.5) for number in range(3))]
+    reasons = []
+    for now in range(40):
+        ego = EgoState(now, np.array([42.0, LANE, 0.0]), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        reasons.append(planner.plan(ego, detections(now, *jam), Goal(), now).reason)
+    assert not any("pass" in reason for reason in reasons[:20])
+    assert any("pass" in reason for reason in reasons) is passes
 
 
 def test_oncoming_traffic_is_awaited_before_passing(roads: RoadNetwork) -> None:
