@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from msgspec.structs import replace
 
@@ -25,6 +26,21 @@ from eidrive_scenario.sensing.readings import EgoState, Readings
 from eidrive_scenario.sensing.settings import MIN_ROTATION
 from eidrive_scenario.v2x.messages.message import ReceivedMessage, StationState
 from eidrive_scenario.world.actor import ActorSpec, Control
+
+
+class NextNumbers(NamedTuple):
+    """Numbers of the next message, object without a track, and track of a station, which continues them if it returns.
+
+    Receivers would take its new messages and objects for the earlier ones with the same numbers.
+    """
+
+    message: int = 0
+    object: int = 0
+    track: int = 0
+
+
+FIRST_NUMBERS = NextNumbers()
+"""Numbers of a station that was not present before."""
 
 NOTHING_FUSED = Detections(0.0)
 """Objects before fusion."""
@@ -80,6 +96,12 @@ class Agent:
     def error_subject(self) -> str:
         """Station that errors of its extensions name."""
         return f"station {self.name!r}"
+
+    @property
+    def next_numbers(self) -> NextNumbers:
+        """Numbers that follow those of all messages and objects."""
+        generator = self.message_generator
+        return NextNumbers(generator.number, generator.numbering.next_id, self.perception.next_track)
 
     def receives_from(self, sender: str, *, own_perception: bool) -> bool:
         """Return whether messages of `sender` are sent to this station: the only place that decides on reception.

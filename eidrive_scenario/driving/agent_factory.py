@@ -7,7 +7,7 @@ from functools import partial
 from numbers import Real
 from typing import Any
 
-from eidrive_scenario.driving.agent import Agent
+from eidrive_scenario.driving.agent import FIRST_NUMBERS, Agent, NextNumbers
 from eidrive_scenario.driving.communication.message_generator import MessageGenerator
 from eidrive_scenario.driving.communication.report_store import SensorDataSharing
 from eidrive_scenario.driving.control.vehicle_controller import VehicleController
@@ -117,11 +117,11 @@ def build_agent(
     dt: float,
     detector: Detector | None = None,
     encoder: Asn1Encoder | None = None,
-    number: int = 0,
+    numbers: NextNumbers = FIRST_NUMBERS,
 ) -> Agent:
     """Build the agent of a station. `detector` is an instance that is built already.
 
-    number  sequence number of its first message
+    numbers  of its first message, object and track
 
     A vehicle without a planner in its settings has the default one. A station that does not drive receives messages
     only if its settings select senders. Raise SettingError if an actor without wheels has a planner.
@@ -160,6 +160,7 @@ def build_agent(
         pose_error=settings.pose_error,
         pose_noise=None if noise is None else PoseNoiseProcess(noise, spec.name, seed),
         false_objects=settings.false_objects,
+        first_track=numbers.track,
     )
     sharing = None
     if fusion.shares is not None:
@@ -186,7 +187,16 @@ def build_agent(
         fusion=fusion,
         planner=driver,
         controller=controller,
-        message_generator=MessageGenerator(spec, settings, view=view, encoder=encoder, seed=seed, dt=dt, number=number),
+        message_generator=MessageGenerator(
+            spec,
+            settings,
+            view=view,
+            encoder=encoder,
+            seed=seed,
+            dt=dt,
+            number=numbers.message,
+            next_id=numbers.object,
+        ),
         dt=dt,
         receives_messages=listens,
         sharing=sharing,

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from msgspec.structs import replace
 
 from eidrive_scenario.base.requests import Overrides
-from eidrive_scenario.driving.agent import Agent
+from eidrive_scenario.driving.agent import FIRST_NUMBERS, Agent, NextNumbers
 from eidrive_scenario.driving.agent_factory import build_agent, build_detector, build_rig
 from eidrive_scenario.driving.communication.radio_line_of_sight import radio_environment
 from eidrive_scenario.driving.communication.run_channel import RunChannel
@@ -136,8 +136,8 @@ class Stations(DrivingStack):
         self._perceived: Mapping[str, StationPerception] = {}
         self._min_existence: dict[str, float] = {}
         self._agents: dict[str, Agent] = {}
-        self._next_numbers: dict[str, int] = {}
-        """Sequence number of the next message of each removed station."""
+        self._next_numbers: dict[str, NextNumbers] = {}
+        """Numbers that each removed station continues if it returns."""
         self._receivers: dict[str, tuple[str, ...]] = {}
         """Receivers of each sender; empty after each change."""
         self._rigs: dict[str, Rig] = {}
@@ -253,7 +253,7 @@ class Stations(DrivingStack):
             dt=context.dt,
             detector=detector,
             encoder=encoder,
-            number=self._next_numbers.pop(spec.name, 0),
+            numbers=self._next_numbers.pop(spec.name, FIRST_NUMBERS),
         )
         if agent.planner is not None:
             self._min_existence[spec.name] = settings.planner_settings.min_existence
@@ -266,7 +266,7 @@ class Stations(DrivingStack):
     def remove(self, name: str) -> None:
         self._receivers.clear()
         if name in self._agents:
-            self._next_numbers[name] = self._agents[name].message_generator.number
+            self._next_numbers[name] = self._agents[name].next_numbers
         for held in (self._agents, self._min_existence, self._rigs, self._signal_sensors, self._overrides):
             held.pop(name, None)
 

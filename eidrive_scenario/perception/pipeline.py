@@ -95,6 +95,7 @@ class Perception:
     pose_error     constant error of the pose, in addition to that of the localizer
     pose_noise     random error of the pose, in addition to both
     false_objects  objects that the detector reports, and that do not exist
+    first_track    added to the numbers of the tracker, which a station that returns must not repeat
     """
 
     def __init__(
@@ -107,6 +108,7 @@ class Perception:
         pose_error: PoseError | None = None,
         pose_noise: PoseNoiseProcess | None = None,
         false_objects: Sequence[FalseObject] = (),
+        first_track: int = 0,
     ) -> None:
         self.detector = detector
         self._checked = is_checked(detector)
@@ -118,6 +120,9 @@ class Perception:
         self._pose_error = pose_error
         self._pose_noise = pose_noise
         self._false_objects = false_objects
+        self._first_track = first_track
+        self.next_track = first_track
+        """Lowest number above those of all tracks."""
         self._pose_sources = [source for source in (localizer, pose_noise) if source is not None]
         """Independent random errors of the pose."""
         self._pose_errors = PoseErrors()
@@ -209,7 +214,7 @@ class Perception:
         if newest is None and self._tracker is not None:
             newest = self._tracker.predict(now - self._latency)
             if newest is not None:
-                newest = checked_detections(self._tracker, "predict", newest, now=now)
+                newest = self._numbered(checked_detections(self._tracker, "predict", newest, now=now))
         return newest
 
     def _track(self, detections: Detections, readings: Readings) -> Detections:
@@ -226,7 +231,14 @@ class Perception:
             return shares
 
         tracked = self._tracker.update(detections, in_view)
-        return checked_detections(self._tracker, "update", tracked, now=readings.time)
+        return self._numbered(checked_detections(self._tracker, "update", tracked, now=readings.time))
+
+    def _numbered(self, tracked: Detections) -> Detections:
+        """Return objects of the tracker with numbers that are unique for the station."""
+        if self._first_track:
+            tracked = replace(tracked, tracks=tuple([self._first_track + number for number in tracked.tracks]))
+        self.next_track = max(self.next_track, 1 + max(tracked.tracks, default=-1))
+        return tracked
 
 
 def _has_all(readings: Readings, kinds: frozenset[str]) -> bool:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pytest
-from scenario_1 import ONE, FrameCollector, edited, simulate
+from scenario_1 import ONE, FrameCollector, edited, simulate, with_properties
 from typer.testing import CliRunner
 
 from eidrive_scenario.cli import app
@@ -246,6 +246,24 @@ def test_message_numbers_continue_after_the_sender_enters_again() -> None:
             numbers += [link.number for link in frame.links if link.sender == "RSU"]
     assert numbers == list(range(len(numbers)))
     assert len(numbers) in (19, 20, 21)
+
+
+@pytest.mark.parametrize("setting", [("generation", "etsi"), ("tracker", "cv")])
+def test_object_ids_are_new_after_the_sender_enters_again(tmp_path: Path, setting: tuple[str, str]) -> None:
+    """Receivers keep objects by their ids for seconds: ids from 0 would rename those of the first presence."""
+    stays: list[set[int]] = [set(), set()]
+    path = with_properties(tmp_path, "RsuStack", setting)
+    with Simulation(load_for_seed(path, 1, {}), seed=1, settings=RunSettings(channel="ideal")) as simulation:
+        assert isinstance(simulation.stack, Stations)
+        rsu = simulation.world.spec("RSU")
+        for stay in stays:
+            for _ in range(30):
+                frame, _ = simulation.tick()
+                stay.update(*(message.identified.tracks for message in frame.steps["RSU"].outbox))
+            simulation.stack.remove("RSU")
+            simulation.stack.add(rsu)
+    assert all(stays)
+    assert max(stays[0]) < min(stays[1])
 
 
 @pytest.mark.parametrize("switched_off", [False, True])

@@ -42,6 +42,7 @@ class MessageGenerator:
     dt       time step [s]: messages are generated in the time step after their phase, and passed to the radio with an
              offset, the remainder of the phase, so that the messages of stations spread over the time step
     number   sequence number of the first message
+    next_id  object id of the first object without a track number
     """
 
     def __init__(
@@ -54,6 +55,7 @@ class MessageGenerator:
         seed: int = 0,
         dt: float = math.inf,
         number: int = 0,
+        next_id: int = 0,
     ) -> None:
         self._spec = spec
         self._settings = settings
@@ -77,7 +79,7 @@ class MessageGenerator:
         """Time of the first evaluation [s]."""
         self._cam_rules = CamGenerationRules(elapsed if fixed is None else None)
         self._cpm_rules = CpmGenerationRules()
-        self._numbering = ObjectIdAssigner()
+        self.numbering = ObjectIdAssigner(next_id)
         self._last_generated = dict.fromkeys(settings.messages, -math.inf)
         """Time of the last message of each kind [s]."""
 
@@ -114,7 +116,7 @@ class MessageGenerator:
         if len(kinds) > 1:
             kinds = tuple(sorted(kinds, key=lambda kind: (self._last_generated[kind], kind)))
         # Also while no message is due: without velocities, ids are kept from one list of detections to the next
-        numbers = self._numbering.assign_ids(detections) if etsi and "cpm" in kinds else ()
+        numbers = self.numbering.assign_ids(detections) if etsi and "cpm" in kinds else ()
         for kind in kinds:
             if etsi and interval > 0.0 and now - max(self._last_generated.values()) < interval - EQUAL:
                 break

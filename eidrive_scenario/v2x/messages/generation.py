@@ -204,10 +204,13 @@ every 0.1 s, and the distance is less than that between the centers of two lanes
 
 
 class ObjectIdAssigner:
-    """Assignment of object ids: those of the tracker, or else of the nearest predicted earlier object."""
+    """Assignment of object ids: those of the tracker, or else of the nearest predicted earlier object.
 
-    def __init__(self) -> None:
-        self._next = 0
+    next_id  of the next object that is new
+    """
+
+    def __init__(self, next_id: int = 0) -> None:
+        self.next_id = next_id
         self._earlier: dict[int, tuple[float, float, float, float, float]] = {}
 
     def assign_ids(self, detections: Detections) -> Sequence[int]:
@@ -226,7 +229,7 @@ class ObjectIdAssigner:
         for row in range(len(detections)):
             number = id_of.get(row)
             if number is None:
-                number, self._next = self._next, self._next + 1
+                number, self.next_id = self.next_id, self.next_id + 1
             x, y = positions[row].tolist()
             vx, vy = (0.0 if math.isnan(v) else v for v in detections.velocity[row].tolist())
             self._earlier[number] = (now, x, y, vx, vy)
