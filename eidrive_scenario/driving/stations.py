@@ -360,8 +360,6 @@ class Stations(DrivingStack):
 
         A message without receivers occupies the medium as well.
         """
-        if self._channel.active is None:
-            return ()
         outbox = [(message, self._receivers_of(sender)) for sender, step in steps.items() for message in step.outbox]
         return self._channel.transmit(outbox, now)
 

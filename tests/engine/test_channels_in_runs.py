@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -196,6 +197,30 @@ def test_run_counts_messages_sent_before_removal_of_the_channel(tmp_path: Path, 
         links = result.links.values()
         assert all(link.sent == link.received + link.lost + link.in_flight for link in links)
         assert sum(link.sent for link in links) == result.metrics["messages.sent"]
+
+
+@pytest.mark.parametrize("channel", ["{delay: {seconds: 0.3}}", "{model: radio, delay: {seconds: 0.32}}"])
+@pytest.mark.parametrize("later", [(), ((0.7, "ideal"),)])
+def test_messages_in_flight_arrive_after_removal_of_the_channel(
+    tmp_path: Path, channel: str, later: tuple[tuple[float, str], ...]
+) -> None:
+    """Each message of the table of outcomes is received in the first time step from its arrival on, and no other."""
+    collector = FrameCollector()
+    path = switched(tmp_path, (0.0, channel), (0.5, "none"), *later)
+    run_file(path, seed=1, settings=RunSettings(time_limit=1.2), observers=[collector])
+    received = [
+        (message.message.sender, message.message.number, round(frame.view.time / 0.05))
+        for frame in collector.frames
+        for message in frame.steps["Ego"].inbox
+    ]
+    arrivals = [
+        (link.sender, link.number, math.ceil(max(link.arrives, link.sent + 1e-3) / 0.05 - 1e-6))
+        for frame in collector.frames
+        for link in frame.links
+        if link.receiver == "Ego" and link.arrives is not None and link.arrives <= 1.2
+    ]
+    assert sorted(arrivals) == sorted(received)
+    assert sum(10 < tick < 18 for _, _, tick in arrivals) >= 5
 
 
 INVALID = [

@@ -34,7 +34,8 @@ class RunChannel:
         self.profile: ChannelProfile | None = None
         self._seed = seed
         self._last: Channel | None = None
-        """The last channel, whose statistics remain part of the result after cooperation is switched off."""
+        """The last channel. After cooperation is switched off it delivers the messages in flight, and its statistics
+        remain part of the result."""
         self._statistics: tuple[float, Mapping[tuple[str, str], LinkStatistics]] | None = None
         """Time and value of the last statistics: those of many links are expensive."""
         self._expired: Counter[tuple[str, str]] = Counter()
@@ -86,18 +87,18 @@ class RunChannel:
 
     def deliver(self, receiver: str, now: float) -> Sequence[ReceivedMessage]:
         """Return the messages that a station has received since the last call."""
-        if self.active is None:
+        if self._last is None:
             return ()
-        delivered: Any = self.active.deliver(receiver, now)
+        delivered: Any = self._last.deliver(receiver, now)
         if not isinstance(delivered, tuple | list):
-            raise _invalid(self.active, "deliver", delivered, "a tuple of ReceivedMessage")
+            raise _invalid(self._last, "deliver", delivered, "a tuple of ReceivedMessage")
         for received in delivered:
             if not isinstance(received, ReceivedMessage):
-                raise _invalid(self.active, "deliver", received, "a ReceivedMessage")
+                raise _invalid(self._last, "deliver", received, "a ReceivedMessage")
             arrived: Any = received.arrived
             if not isinstance(arrived, _NUMBER) or not -math.inf < arrived <= now + 1e-6:
                 text = f"returned a message that arrived at {arrived!r} (expected a time up to {now:g} s)"
-                raise InvalidResult(self.active, "deliver", text)
+                raise InvalidResult(self._last, "deliver", text)
         return delivered
 
     def count_expired(self, sender: str, receiver: str) -> None:
@@ -107,7 +108,7 @@ class RunChannel:
     def transmit(self, outbox: Sequence[OutgoingMessage], now: float) -> Sequence[LinkEvent]:
         """Transmit messages to their receivers; return the outcomes that are known."""
         if self.active is None:
-            return ()
+            return self.final_links()
         self._statistics = None
         return _checked_events(self.active, self.active.transmit(outbox, now))
 
