@@ -1,4 +1,5 @@
-"""Warnings about stations: areas off the roads, lights out of view, short delays and views, stations at rest."""
+"""Warnings about stations: areas off the roads, lights out of view, short delays and views, fast messages, stations at
+rest."""
 
 from __future__ import annotations
 
@@ -140,6 +141,17 @@ def short_detector_latencies(settings: Mapping[str, AgentSettings], dt: float) -
             yield Diagnostic(
                 f"detections of {name!r} are known one step of {dt:g} s later: "
                 f"its detector_latency is only {station.detector_latency:g} s",
+                "use a smaller step (RunSettings.dt) to resolve it",
+            )
+
+
+def fast_message_rates(settings: Mapping[str, AgentSettings], dt: float) -> Iterator[Diagnostic]:
+    """Yield a warning for each station that should send more than one message in one step `dt` [s]."""
+    for name, station in settings.items():
+        rate = station.message_rate
+        if rate is not None and rate * dt > 1.0 + TIME_TOLERANCE:
+            yield Diagnostic(
+                f"{name!r} sends one message in each step of {dt:g} s: its message_rate is {rate:g} Hz",
                 "use a smaller step (RunSettings.dt) to resolve it",
             )
 

@@ -27,6 +27,7 @@ from eidrive_scenario.driving.station_declarations import (
 )
 from eidrive_scenario.driving.station_warnings import (
     areas_off_road,
+    fast_message_rates,
     lights_out_of_view,
     short_channel_delay,
     short_detector_latencies,
@@ -228,6 +229,7 @@ class Stations(DrivingStack):
         yield from areas_off_road(context.scenario, self._settings, context.roads)
         yield from lights_out_of_view(context.scenario, self._settings, context.roads)
         yield from short_detector_latencies(self._settings, context.dt)
+        yield from fast_message_rates(self._settings, context.dt)
         yield from short_views({name: self._settings[name] for name in self.possible_drivers}, self._detectors)
         if context.channel is not None:
             yield from short_channel_delay(self._channel.profile, context.dt, "RunSettings.channel")

@@ -159,6 +159,15 @@ def test_detector_latency_below_one_step_is_reported(make: Make) -> None:
     assert "detections of 'Ego' are known one step of 0.05 s later: its detector_latency is only 0.02 s" in warning
 
 
+@pytest.mark.parametrize(("dt", "warns"), [(0.05, False), (0.1, True)])
+def test_message_rate_beyond_one_message_per_step_is_reported(make: Make, dt: float, warns: bool) -> None:
+    area = '<Property name="conflict_area"'
+    path = make((area, f'<Property name="message_rate" value="20"/>{area}'))
+    warnings = ours(run_file(path, settings=RunSettings(time_limit=0.3, dt=dt)).warnings)
+    expected = "'Ego' sends one message in each step of 0.1 s: its message_rate is 20 Hz"
+    assert [expected in warning for warning in warnings] == [True] * warns
+
+
 @pytest.mark.parametrize(("speed", "warns"), [(18.0, False), (18.5, True)])
 def test_target_speed_beyond_the_view_is_reported(make: Make, speed: float, warns: bool) -> None:
     """From 18.1 m/s a vehicle stops within 50 m: 0.5 s · 18.1 m/s + (18.1 m/s)² / (2 · 4 m/s²)."""
