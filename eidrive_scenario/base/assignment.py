@@ -1,4 +1,4 @@
-"""Gated assignment of two lists: the maximum number of pairs, and among these the minimum sum of costs."""
+"""Gated assignment of two lists: the minimum sum of costs, by default with the maximum number of pairs."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from eidrive_scenario.base.arrays import Array, Bools
 
 OUTSIDE = 1e6
 """Cost of a pair outside the gate: finite, so that a full assignment exists, and above any sum of gated costs."""
+_TIE = 1e-6
+"""Cost by which one more pair is preferred if the sums are equal."""
 
 
 def associate(first: Array, second: Array, gate: float) -> list[tuple[int, int]]:
@@ -36,8 +38,14 @@ def assign_matrix(cost: Array, inside: Bools) -> list[tuple[int, int]]:
     return assign(rows.tolist(), columns.tolist(), cost[inside].tolist())
 
 
-def assign(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) -> list[tuple[int, int]]:
+def assign(
+    rows: Sequence[int], columns: Sequence[int], costs: Sequence[float], limits: Sequence[float] = ()
+) -> list[tuple[int, int]]:
     """Return the assigned pairs of the candidate pairs (row, column): maximum number, then minimum sum of costs.
+
+    limits  at least the costs. Then each pair that is not assigned costs the maximum limit of the competing pairs
+            instead (global nearest neighbors; Blackman and Popoli, Design and analysis of modern tracking systems,
+            1999, section 6.4), and the number of pairs resolves ties
 
     Each row and column is used at most once. The order of the indices resolves ties. Pairs without a common row or
     column, directly or by other pairs, are assigned separately.
@@ -50,7 +58,10 @@ def assign(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) 
         own_rows, own_columns = [rows[index] for index in part], [columns[index] for index in part]
         own_costs = [costs[index] for index in part]
         stars = _assign_stars(own_rows, own_columns, own_costs)
-        chosen.update(_assign_optimally(own_rows, own_columns, own_costs) if stars is None else stars)
+        if stars is None:
+            limit = max([limits[index] for index in part]) + _TIE if limits else OUTSIDE
+            stars = _assign_optimally(own_rows, own_columns, own_costs, limit)
+        chosen.update(stars)
     return [pair for pair in zip(rows, columns, strict=True) if pair in chosen]
 
 
@@ -72,13 +83,15 @@ def _components(rows: Sequence[int], columns: Sequence[int]) -> list[list[int]]:
     return list(parts.values())
 
 
-def _assign_optimally(rows: Sequence[int], columns: Sequence[int], costs: Sequence[float]) -> list[tuple[int, int]]:
+def _assign_optimally(
+    rows: Sequence[int], columns: Sequence[int], costs: Sequence[float], limit: float
+) -> list[tuple[int, int]]:
     """Return the result of `assign` by the general method."""
     from scipy.optimize import linear_sum_assignment
 
     row_of = {row: index for index, row in enumerate(sorted(set(rows)))}
     column_of = {column: index for index, column in enumerate(sorted(set(columns)))}
-    matrix = np.full((len(row_of), len(column_of)), OUTSIDE)
+    matrix = np.full((len(row_of), len(column_of)), limit)
     for row, column, cost in zip(rows, columns, costs, strict=True):
         matrix[row_of[row], column_of[column]] = cost
     assigned = {

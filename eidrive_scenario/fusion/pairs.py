@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array, Integers
-from eidrive_scenario.base.assignment import assign
+from eidrive_scenario.base.assignment import OUTSIDE, assign
 from eidrive_scenario.base.geometry import on_two_levels
 from eidrive_scenario.perception.tracking.association import UNASSIGNED_GATE
 
@@ -41,7 +41,7 @@ class AssociationGate(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """Candidate pairs: rows of both tables, cost of the association, and whether the pair is inside the gate.
+    """Candidate pairs: rows of both tables, costs with and without the association, and whether a pair is in the gate.
 
     Pairs outside the gate are only used for tracks without another partner.
     """
@@ -49,6 +49,7 @@ class Pairs(NamedTuple):
     first: list[int]
     second: list[int]
     cost: list[float]
+    limit: list[float]
     inside: list[bool]
 
 
@@ -59,6 +60,11 @@ def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_stat
     Candidates are on one level, not on and below a bridge. They are within the gate, have the same object id of the
     station, or have centers within half a width of each other, because two bodies cannot overlap even if the
     covariances are small. The cost is the negative log-likelihood of the offset without constants.
+
+    The cost without a pair is that at the gate: two stations see different parts of a row of parked cars, and the
+    maximum number of pairs would shift one part by a car. Errors of poses move all objects of a station together and
+    say nothing about a single pair, so that only the other errors count there. A station that repeats its report sees
+    the same objects: the number of its pairs is maximum.
     """
     own = _Side.of(first, gate)
     other = own if second is first else _Side.of(second, gate)
@@ -79,7 +85,7 @@ def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_stat
         certain = (first["number"][rows] == number) & (number >= 0)
         near |= certain
     if not near.any():
-        return Pairs([], [], [], [])
+        return Pairs([], [], [], [], [])
     if not near.all():
         rows, columns, x, y = rows[near], columns[near], x[near], y[near]
         certain = None if certain is None else certain[near]
@@ -93,29 +99,30 @@ def gated_pairs(first: Table, second: Table, gate: AssociationGate, *, same_stat
     inside = np.where(vague, square < gate.distance**2, mahalanobis <= gate.chi_square)
     narrower = np.minimum(own.width[rows], other.width[columns])
     inside |= square < 0.25 * narrower * narrower
-    cost = mahalanobis + np.log(determinant)
+    size = np.log(determinant)
+    cost = mahalanobis + size
+    limit = np.full(len(cost), OUTSIDE)
+    if not same_station:
+        separate = own.separate[rows] + other.separate[columns]
+        limit = np.maximum(cost, gate.chi_square * (xx + yy) / separate + size)
     if certain is not None:
         inside |= certain
         cost[certain] = CERTAIN
     fits = inside | (~vague & (mahalanobis <= UNASSIGNED_GATE))
-    return Pairs(rows[fits].tolist(), columns[fits].tolist(), cost[fits].tolist(), inside[fits].tolist())
+    return Pairs(*(values[fits].tolist() for values in (rows, columns, cost, limit, inside)))
 
 
 def assigned_pairs(pairs: Pairs) -> list[tuple[int, int]]:
     """Return the assigned pairs: first within the gate, then among the unassigned rows."""
     if all(pairs.inside):
-        return assign(pairs.first, pairs.second, pairs.cost)
+        return assign(*pairs[:4])
     assigned = (
-        assign(*zip(*(pair[:3] for pair in zip(*pairs, strict=True) if pair[3]), strict=True))
+        assign(*zip(*(pair[:4] for pair in zip(*pairs, strict=True) if pair[4]), strict=True))
         if any(pairs.inside)
         else []
     )
     rows, columns = {row for row, _ in assigned}, {column for _, column in assigned}
-    rest = [
-        (row, column, cost)
-        for row, column, cost in zip(pairs.first, pairs.second, pairs.cost, strict=True)
-        if row not in rows and column not in columns
-    ]
+    rest = [pair[:3] for pair in zip(*pairs, strict=True) if pair[0] not in rows and pair[1] not in columns]
     return assigned + assign(*zip(*rest, strict=True)) if rest else assigned
 
 
@@ -161,7 +168,8 @@ def ranges(starts: Integers, ends: Integers, order: Integers) -> tuple[Integers,
 class _Side(NamedTuple):
     """One side of the pairs, (N,) each: position, covariance, width, and whether the covariance is unknown.
 
-    reach  maximum contribution of this side to the distance of a candidate pair [m]
+    separate  trace of the covariance without the error of the pose, which all tracks of a station share
+    reach     maximum contribution of this side to the distance of a candidate pair [m]
     """
 
     x: Array
@@ -171,6 +179,7 @@ class _Side(NamedTuple):
     yy: Array
     width: Array
     vague: NDArray[np.bool_]
+    separate: Array
     reach: Array
 
     @classmethod
@@ -179,8 +188,9 @@ class _Side(NamedTuple):
         xx, yy = covariance[:, 0, 0] + pose[:, 0, 0], covariance[:, 1, 1] + pose[:, 1, 1]
         width = tracks["body"][:, 2]
         statistical = math.sqrt(max(gate.chi_square, UNASSIGNED_GATE)) * np.sqrt(xx + yy)
+        separate = covariance[:, 0, 0] + covariance[:, 1, 1]
         reach = np.maximum(statistical, np.where(vague, gate.distance, width))
-        return cls(mean[:, 0], mean[:, 1], xx, covariance[:, 0, 1] + pose[:, 0, 1], yy, width, vague, reach)
+        return cls(mean[:, 0], mean[:, 1], xx, covariance[:, 0, 1] + pose[:, 0, 1], yy, width, vague, separate, reach)
 
 
 class Objects(NamedTuple):
@@ -193,7 +203,7 @@ class Objects(NamedTuple):
 def group_tracks(tracks: Table, gate: AssociationGate) -> Objects:
     """Return the rows of each object, from tracks at a common time that are sorted by receiving station and station.
 
-    The tracks of each station in turn are assigned to known objects: maximum number, then minimum cost, and at most one
+    The tracks of each station in turn are assigned to known objects by global nearest neighbors (`assign`), at most one
     per object, because a station reports different objects. Unassigned tracks form new objects. The cost of an object
     is that of its likeliest member. Objects are in the order of their first tracks. Each receiving station has its own
     objects.
@@ -217,7 +227,7 @@ def group_tracks(tracks: Table, gate: AssociationGate) -> Objects:
             # Pairs are in order of their rows: those of one receiver are consecutive.
             part = slice(bisect_left(pairs.first, begin), bisect_left(pairs.first, end))
             of_first, of_second = ([row - begin for row in side[part]] for side in (pairs.first, pairs.second))
-            own = Pairs(of_first, of_second, pairs.cost[part], pairs.inside[part])
+            own = Pairs(of_first, of_second, pairs.cost[part], pairs.limit[part], pairs.inside[part])
             for members in _group_sequentially(station[begin:end].tolist(), own):
                 label[[begin + row for row in members]] = begin + members[0]
     rows = np.argsort(label, kind="stable")
@@ -235,9 +245,9 @@ def _tracks_of_one_station(label: Integers, station: Integers) -> Integers:
 
 
 def _group_sequentially(stations: Sequence[int], pairs: Pairs) -> list[list[int]]:
-    partners: dict[int, list[tuple[int, float, bool]]] = {}
-    for first, second, cost, inside in zip(*pairs, strict=True):
-        partners.setdefault(second, []).append((first, cost, inside))
+    partners: dict[int, list[tuple[int, float, float, bool]]] = {}
+    for first, second, cost, limit, inside in zip(*pairs, strict=True):
+        partners.setdefault(second, []).append((first, cost, limit, inside))
     objects: list[list[int]] = []
     object_of: dict[int, int] = {}
     start = 0
@@ -256,18 +266,27 @@ def _group_sequentially(stations: Sequence[int], pairs: Pairs) -> list[list[int]
 
 
 def _assign_rows(
-    rows: Sequence[int], partners: dict[int, list[tuple[int, float, bool]]], object_of: dict[int, int]
+    rows: Sequence[int], partners: dict[int, list[tuple[int, float, float, bool]]], object_of: dict[int, int]
 ) -> dict[int, int]:
     """Return the object of each of these rows of one station; rows without a candidate are omitted."""
-    best: dict[tuple[int, int], tuple[bool, float]] = {}
+    best: dict[tuple[int, int], tuple[bool, float, float]] = {}
     for row in rows:
-        for other, cost, inside in partners.get(row, ()):
+        for other, cost, limit, is_inside in partners.get(row, ()):
             pair = (object_of[other], row)
-            best[pair] = min((not inside, cost), best.get(pair, (True, math.inf)))
+            best[pair] = min((not is_inside, cost, limit), best.get(pair, (True, math.inf, math.inf)))
+    # A track that remains because it is another object than its candidates within the gate has no partner outside.
+    inside = [pair for pair, (outside, _, _) in best.items() if not outside]
+    labels, near = {label for label, _ in inside}, {row for _, row in inside}
+    best = {
+        pair: values
+        for pair, values in best.items()
+        if not values[0] or (pair[0] not in labels and pair[1] not in near)
+    }
     pairs = Pairs(
         [label for label, _ in best],
         [row for _, row in best],
-        [cost for _, cost in best.values()],
-        [not outside for outside, _ in best.values()],
+        [cost for _, cost, _ in best.values()],
+        [limit for _, _, limit in best.values()],
+        [not outside for outside, _, _ in best.values()],
     )
     return {row: label for label, row in assigned_pairs(pairs)}

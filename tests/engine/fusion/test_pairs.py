@@ -37,13 +37,13 @@ def test_candidates_of_many_tracks_equal_those_of_one_by_one(spread: float, same
     assert pairs.first or spread == 3000.0
 
 
-def pairs_one_by_one(first: Table, second: Table, same_station: bool) -> list[tuple[int, int, float, bool]]:
+def pairs_one_by_one(first: Table, second: Table, same_station: bool) -> list[tuple[int, int, float, float, bool]]:
     """Return the candidates, each from a comparison of two single tracks."""
     found = []
     for row in range(len(first)):
         for column in range(len(second)):
             pair = gated_pairs(first[row : row + 1], second[column : column + 1], GATE, same_station=same_station)
-            found += [(row, column, *rest) for rest in zip(pair.cost, pair.inside, strict=True)]
+            found += [(row, column, *rest) for rest in zip(pair.cost, pair.limit, pair.inside, strict=True)]
     return found
 
 
