@@ -247,6 +247,7 @@ class Reader:
         self._text(node, content, values)
         check_children(node, children, content, self.version, self._error)
         declared = []
+        scope.awaited = {child.get("name", "") for child in children}
         for child in children:
             if child.tag in content.children:
                 errors_before = self._error_count
@@ -255,6 +256,7 @@ class Reader:
                 )
                 is_valid = self._error_count == errors_before
                 declared.append(self._declare(declaration, scope, assignments, is_valid))
+                scope.awaited.discard(str(declaration.name))
         values["parameter_declaration"] = tuple(declared)
         self._unknown_parameters(assignments, scope.parameters)
         assignments.clear()

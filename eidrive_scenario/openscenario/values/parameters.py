@@ -102,6 +102,8 @@ class Scope:
     """Names of the used parameters of a scope that belongs to another file; None for the own file."""
     budget: Budget = field(default_factory=Budget)
     """Limits of the texts of expressions."""
+    awaited: set[str] = field(default_factory=set)
+    """Names of the parameters whose declarations have not been read yet."""
 
     def inner(self) -> Scope:
         """Return a new inner scope."""
@@ -110,7 +112,9 @@ class Scope:
     def find(self, name: str) -> Parameter:
         """Return the parameter of a name. Raise ExpressionError if it is unknown or invalid."""
         scope: Scope | None = self
+        is_awaited = False
         while scope is not None:
+            is_awaited |= name in scope.awaited
             parameter = scope.parameters.get(name)
             if parameter is not None:
                 if not parameter.is_valid:
@@ -119,6 +123,8 @@ class Scope:
                     scope.lent.add(name)
                 return parameter
             scope = scope.outer
+        if is_awaited:
+            raise ExpressionError(f"parameter ${name} is used before its declaration", "declare it above this use")
         raise ExpressionError(f"unknown parameter ${shortened(name, 200)}", suggestion(name, self.names()))
 
     def declared(self, name: str) -> Parameter | None:

@@ -140,6 +140,13 @@ def test_invalid_declaration_is_reported_once() -> None:
     assert "has no value" in str(caught.value)
 
 
+@pytest.mark.parametrize("kmh", ["1", "$Speed", "${2 * $Speed}"], ids=["order", "cycle", "cycle of expressions"])
+def test_use_before_the_declaration_is_reported_as_that(kmh: str) -> None:
+    declared = parameters_xml(Speed=("double", "${$Kmh / 3.6}"), Kmh=("double", kmh))
+    with pytest.raises(ScenarioError, match=r"parameter \$Kmh is used before its declaration; declare it above"):
+        load_scenario(scenario_xml(declarations=declared))
+
+
 def test_parameter_reference_attribute_may_be_a_parameter() -> None:
     condition = '<ParameterCondition parameterRef="$Speed" rule="equalTo" value="3"/>'
     stop = f"""<ConditionGroup><Condition name="c" delay="0" conditionEdge="none">
