@@ -146,13 +146,13 @@ def test_fuse_gate_is_chi_square_with_wider_gate_for_unassigned_tracks(report: M
 def test_fuse_keeps_the_places_of_a_row_seen_in_parts(age: float, seen: int, report: Make, fuse: Fuse) -> None:
     """Cars stand 6 m apart, and each of two stations omits one end. After 1 s the variances are 0.01 + 0.25 + 2 m², so
     that a shifted pair is within the gate, and the shift has one more pair."""
-    row = [(6.0 * number, 0.0) for number in range(seen + 1)]
+    cars = [(6.0 * number, 0.0) for number in range(seen + 1)]
     parts = [
         report(name, 0.0, part, velocity=(0.0, 0.0), covariance=0.01)
-        for name, part in (("A", row[:-1]), ("B", row[1:]))
+        for name, part in (("A", cars[:-1]), ("B", cars[1:]))
     ]
     fused = fuse(parts, age)
-    np.testing.assert_allclose(sorted(fused.boxes[:, 0]), [x for x, _ in row], atol=1e-6)
+    np.testing.assert_allclose(sorted(fused.boxes[:, 0]), [x for x, _ in cars], atol=1e-6)
 
 
 def test_fuse_without_covariance_uses_the_distance_gate(report: Make, fuse: Fuse) -> None:

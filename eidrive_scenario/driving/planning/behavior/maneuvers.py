@@ -607,8 +607,7 @@ def _queues(situation: Situation, scene: Surroundings, blocker: Present) -> bool
     if end < len(along) and blocker.front + QUEUE_GAP > along[end - 1]:
         return True  # What it may wait behind is not in the window yet.
     return any(
-        -0.5 < hypothesis.rear - blocker.front < QUEUE_GAP and abs(hypothesis.d - blocker.d) < 1.0
-        for hypothesis in scene.present
+        _continues_queue(hypothesis, blocker) and abs(hypothesis.d - blocker.d) < 1.0 for hypothesis in scene.present
     )
 
 
@@ -623,11 +622,16 @@ def _jams(situation: Situation, scene: Surroundings, blocker: Present) -> bool:
     if not _stands_in_traffic(situation, blocker, patience) or _is_beside(situation, blocker):
         return False
     return any(
-        -0.5 < hypothesis.rear - blocker.front < QUEUE_GAP
+        _continues_queue(hypothesis, blocker)
         and (abs(hypothesis.d - lanes.left) < 1.0 or abs(hypothesis.d - lanes.right) < 1.0)
         and _stands_in_traffic(situation, hypothesis, math.inf)
         for hypothesis in scene.present
     )
+
+
+def _continues_queue(hypothesis: Present, blocker: Present) -> bool:
+    """Return whether an object is as far ahead of the blocker as the next vehicle of a queue."""
+    return -0.5 < hypothesis.rear - blocker.front < QUEUE_GAP
 
 
 def _stands_in_traffic(situation: Situation, hypothesis: Present, patience: float) -> bool:
