@@ -12,6 +12,7 @@ import numpy as np
 from lxml import etree
 from pydantic import Field
 
+from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.errors import Diagnostic, ErrorCollector, SettingError, quoted
 from eidrive_scenario.extensions.library import resolve_path
 from eidrive_scenario.extensions.settings import Settings, parse_settings
@@ -30,6 +31,10 @@ LANES = 400
 """Maximum number of lanes whose position is compared with the roads of the scenario."""
 MATCHING = 0.5
 """Minimum share of them on the roads."""
+MAX_DISTANCE = 0.5
+"""Maximum mean distance of these from the centers of lanes [m]; up to 0.25 m for lanes of varying width."""
+OFF_ROAD = 10.0
+"""Distance of lanes off the roads where offsets of the network are compared [m]."""
 _UNITS = (1.0, 60.0, 3600.0, 86400.0)
 """Units of the parts of a time such as D:H:M:S, from the last one [s]."""
 _WRITING = ("has.", "device.", "file")
@@ -136,22 +141,39 @@ def _check_network(root: etree._Element, source: str, roads: RoadNetwork) -> tup
     x, y = _point("" if location is None else location.get("netOffset", ""), "netOffset", source, location)
     points = np.array(list(_lane_points(root, source)), dtype=np.float64).reshape(-1, 2)
     points = points[:: len(points) // LANES + 1]
-    located = roads.locate(points[:, 0] - x, points[:, 1] - y)
-    share = float(np.mean((located.road >= 0) & (located.outside <= 0.0))) if len(points) else 0.0
+    # Roads are imported with the offset of their header, and exported in coordinates of the network
+    dx, dy, *_ = roads.header.offset
+    distances = {offset: _lane_distances(points - offset, roads) for offset in ((x + dx, y + dy), (0.0, 0.0))}
+    offset = min(distances, key=lambda offset: float(np.minimum(distances[offset], OFF_ROAD).sum()))
+    on_roads = distances[offset][np.isfinite(distances[offset])]
+    share = len(on_roads) / max(len(points), 1)
+    message = ""
     if share < MATCHING:
         message = f"only {share:.0%} of the lanes of the network are on the roads of the scenario"
+    elif (distance := float(on_roads.mean())) > MAX_DISTANCE:
+        message = f"the lanes of the network are {distance:.1f} m beside those of the scenario"
+    if message:
         hint = "create the network from the road file: netconvert --opendrive-files ROADS.xodr -o NETWORK.net.xml"
         raise SettingError(Diagnostic(message, hint, source))
-    return x, y
+    return offset
+
+
+def _lane_distances(points: Array, roads: RoadNetwork) -> Array:
+    """Return the distance of points (N, 2) from the centers of their lanes [m]; infinite off the roads."""
+    located = roads.locate(points[:, 0], points[:, 1])
+    return np.where(located.found & (located.outside <= 0.0), np.abs(located.offset), np.inf)
 
 
 def _lane_points(root: etree._Element, source: str) -> Iterator[tuple[float, float]]:
-    """Yield a point of each lane outside of junctions."""
+    """Yield the middle of the central segment of each lane outside of junctions."""
     for edge in root.iterfind("edge"):
         if edge.get("function", "normal") == "normal":
             for lane in edge.iterfind("lane"):
-                points = lane.get("shape", "").split()
-                yield _point(points[len(points) // 2] if points else "", "shape of a lane", source, lane)
+                points = lane.get("shape", "").split() or [""]
+                center = len(points) // 2
+                ends = [_point(point, "shape of a lane", source, lane) for point in points[center - 1 : center + 1]]
+                (x, y), (next_x, next_y) = ends[0], ends[-1]
+                yield 0.5 * (x + next_x), 0.5 * (y + next_y)
 
 
 def _point(text: str, name: str, source: str, element: etree._Element | None) -> tuple[float, float]:
