@@ -26,6 +26,7 @@ from eidrive_scenario.v2x.messages.generation import (
     ObjectIdAssigner,
     cam_size,
     cpm_size,
+    earlier_state,
     objects_that_fit,
 )
 from eidrive_scenario.v2x.messages.message import Message, Payload, StationState, shift_timestamps, station_id
@@ -73,9 +74,12 @@ class MessageGenerator:
             self._phase = start / settings.message_rate if fixed is None else fixed
         elif settings.generation == "etsi":
             self._phase = start * CHECK if fixed is None else fixed
+        self._dt = 0.0 if math.isinf(dt) else dt
         self._offset = 0.0 if math.isinf(dt) else max(0.0, self._phase - math.floor(self._phase / dt + EQUAL) * dt)
         """Time from the time step of a message until it is passed to the radio [s]."""
         self._first = math.inf
+        """Earliest time of the first evaluation [s]."""
+        self._origin = math.inf
         """Time of the first evaluation [s]."""
         self._cam_rules = CamGenerationRules(elapsed if fixed is None else None)
         self._cpm_rules = CpmGenerationRules()
@@ -106,7 +110,7 @@ class MessageGenerator:
             self._first = now + self._phase
         if now < self._first - EQUAL:
             return ()
-        etsi = self._settings.generation == "etsi"
+        etsi, evaluated = self._settings.generation == "etsi", self._evaluation_time(now)
         has_measured = measured > -math.inf
         if not etsi and not self._is_due_by_rate(now):
             return ()
@@ -126,11 +130,11 @@ class MessageGenerator:
                 if etsi and not has_measured:
                     continue
                 if etsi:
-                    messages = self._triggered_cpms(state, detections, numbers, now, shortest)
+                    messages = self._triggered_cpms(state, detections, numbers, now, evaluated, shortest)
                 else:  # an empty CPM states that no object is in sight
                     messages = [self._message(state, detections, now, lists_sensors=has_measured)]
-            elif not etsi or self._cam_rules.is_due(state, now, shortest):
-                low = self._cam_rules.low_frequency(now)
+            elif not etsi or self._cam_rules.is_due(earlier_state(state, now - evaluated), evaluated, shortest):
+                low = self._cam_rules.low_frequency(evaluated)
                 messages = [self._message(state, own_body(self._spec, state), now, "cam", low_frequency=low)]
             if not messages:
                 continue
@@ -175,11 +179,27 @@ class MessageGenerator:
         self._periods = period
         return True
 
+    def _evaluation_time(self, now: float) -> float:
+        """Return the time of this tick for the ETSI rules.
+
+        In the first tick after a multiple of their period it is that multiple, as their intervals would otherwise be
+        rounded up to time steps.
+        """
+        self._origin = min(self._origin, now)
+        multiple = self._origin + CHECK * math.floor((now - self._origin + EQUAL) / CHECK)
+        return multiple if EQUAL < now - multiple < self._dt - EQUAL else now
+
     def _triggered_cpms(
-        self, state: StationState, detections: Detections, numbers: Sequence[int], now: float, shortest: float
+        self,
+        state: StationState,
+        detections: Detections,
+        numbers: Sequence[int],
+        now: float,
+        evaluated: float,
+        shortest: float,
     ) -> list[Message]:
         """Return the CPMs with the objects that the ETSI rules select, segmented by the MTU."""
-        contents = self._cpm_rules.contents(detections, numbers, now, shortest)
+        contents = self._cpm_rules.contents(detections, numbers, evaluated, shortest)
         if contents is None:
             return []
         lists_sensors, rows = contents.sensors and bool(self._view), list(contents.rows)

@@ -76,9 +76,7 @@ class CamGenerationRules:
         speed = abs(state.speed)
         interval = DISTANCE / speed if speed * LONGEST > DISTANCE else LONGEST
         age = elapsed * max(interval, SHORTEST)
-        back = state.speed * age
-        x, y = state.x - back * math.cos(state.yaw), state.y - back * math.sin(state.yaw)
-        self._sent, self._last = now - age, replace(state, x=x, y=y)
+        self._sent, self._last = now - age, earlier_state(state, age)
 
     def low_frequency(self, now: float) -> bool:
         """Return True if the message that is sent now carries the low-frequency container."""
@@ -86,6 +84,12 @@ class CamGenerationRules:
             return False
         self._low_frequency = now
         return True
+
+
+def earlier_state(state: StationState, age: float) -> StationState:
+    """Return the state of a station that has driven straight on for a time [s]."""
+    back = state.speed * age
+    return replace(state, x=state.x - back * math.cos(state.yaw), y=state.y - back * math.sin(state.yaw))
 
 
 RETENTION = 2.0 * LONGEST

@@ -21,16 +21,27 @@ VIEW = ViewSector(0.0, 0.0, 1.0, 0.0, math.pi, 50.0)
 
 
 def sent(
-    name: str, seconds: float, *, speed: float = 0.0, seed: int = 1, begin: float = 0.0, **properties: object
+    name: str,
+    seconds: float,
+    *,
+    speed: float = 0.0,
+    seed: int = 1,
+    begin: float = 0.0,
+    dt: float = DT,
+    seen: bool = False,
+    **properties: object,
 ) -> list[float]:
-    """Times of the messages of a station that drives straight on."""
+    """Times of the messages of a station that drives straight on, and that sees a vehicle before it if `seen`."""
     spec = ActorSpec(name, "car", "car", (4.5, 1.8, 1.5), (1.4, 0.0, 0.75), wheelbase=2.7)
-    generator = MessageGenerator(spec, AgentSettings.model_validate(properties), view=(VIEW,), seed=seed)
-    times = [begin + tick * DT for tick in range(round(seconds / DT))]
+    generator = MessageGenerator(spec, AgentSettings.model_validate(properties), view=(VIEW,), seed=seed, dt=dt)
+    times = [begin + tick * dt for tick in range(round(seconds / dt))]
     found = []
     for now in times:
         state = StationState(now, speed * now, 0.0, 0.0, 0.0, speed)
-        found += [message.generated for message in generator.generate(state, Detections(now), now)]
+        box, unknown = [speed * now + 20.0, 0.0, 0.75, 4.5, 1.8, 1.5, 0.0], np.full((1, 2, 2), np.nan)
+        ahead = Detections(now, np.array([box]), np.ones(1), ("car",), np.array([[speed, 0.0]]), unknown)
+        detections = ahead if seen else Detections(now)
+        found += [message.generated for message in generator.generate(state, detections, now)]
     return found
 
 
@@ -61,6 +72,27 @@ def test_first_cam_of_a_moving_station_follows_within_four_meters(speed: float) 
     runs = [sent(f"Car{number}", 2.0, speed=speed, messages="cam", generation="etsi") for number in range(60)]
     assert max(run[0] for run in runs) <= 4.0 / abs(speed) + 0.1 + DT
     assert np.mean([run[0] for run in runs]) == pytest.approx(2.0 / abs(speed) + 0.1, abs=0.05)
+
+
+@pytest.mark.parametrize("dt", [0.02, 0.03, 0.04, 0.05, 0.07, 0.1])
+@pytest.mark.parametrize(
+    ("messages", "speed", "interval"),
+    [
+        ("cam", 0.0, 1.0),
+        ("cam", 15.0, 0.3),
+        ("cam", 25.0, 0.2),
+        ("cam", 45.0, 0.1),
+        ("cpm", 0.0, 1.0),
+        ("cpm", 70.0, 0.1),
+    ],
+)
+def test_etsi_messages_are_sent_in_the_tick_after_each_interval(
+    messages: str, speed: float, interval: float, dt: float
+) -> None:
+    """(floor(4 / 0.1 v) + 1) 0.1 s, at most 1 s, also if the time step does not divide it."""
+    times = sent("Car", 6.0, speed=speed, seen=True, dt=dt, messages=messages, generation="etsi", message_phase=0)
+    assert times == pytest.approx([dt * math.ceil(n * interval / dt - 1e-6) for n in range(len(times))])
+    assert len(times) >= 5.8 / interval
 
 
 def test_phase_depends_on_seed_and_name_only() -> None:
