@@ -26,7 +26,7 @@ class LinkStatistics:
     mean_delay, max_delay  from sending to arrival of received messages [s]; None before the first reception
     age         age of information at the receiver: time since generation of the newest received message [s]
     mean_age, p95_age, peak_age   mean and 95th percentile over time, and mean age immediately before an update,
-                since the first reception [s]
+                since the first reception [s], while both stations are present
     reception   by distance class: lower bound [m], messages whose outcome is known, delivered messages
     channel_busy_ratio  share of time in which the receiver measures a busy channel; None if the model has none
     expired     number of received messages that the receiver does not use because they are too old
@@ -214,11 +214,11 @@ class Links:
                 arrivals[sender, receiver] = max(arrives, arrivals.get((sender, receiver), arrives))
         return arrivals
 
-    def remove(self, receiver: str) -> None:
-        """End the links to a station that has left: messages in flight to it are lost, and their age is not counted."""
-        for _, sender, *_ in self._queues.pop(receiver, ()):
-            self.counters(sender, receiver).count_loss(ABSENT)
-        self._reception_log.end_links(receiver, self._now)
+    def remove(self, station: str) -> None:
+        """End the links of a station that has left: messages in flight to it are lost, and no age is counted."""
+        for _, sender, *_ in self._queues.pop(station, ()):
+            self.counters(sender, station).count_loss(ABSENT)
+        self._reception_log.end_links(station, self._now)
 
     def statistics(
         self, now: float, channel_busy_ratio: Callable[[str], float | None] = lambda station: None

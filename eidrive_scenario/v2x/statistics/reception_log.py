@@ -32,7 +32,7 @@ class AgeOfInformation:
 
     def __init__(self) -> None:
         self._floor = np.zeros(0)
-        """Age at the last update of each link [s]; NaN before the first, and after the receiver has left."""
+        """Age at the last update of each link [s]; NaN before the first, and after a station has left."""
         self._time, self._area, self._peaks = np.zeros(0), np.zeros(0), np.zeros(0)
         self._updates = np.zeros(0, dtype=np.int64)
         self._breakpoints: list[tuple[Integers, Array, Integers]] = []
@@ -181,7 +181,9 @@ class ReceptionLog:
         self._received: Integers = np.zeros(0, dtype=np.int64)
         self._delay_sum, self._delay_max, self._newest = np.zeros(0), np.zeros(0), np.zeros(0)
         self._newest_present = np.zeros(0)
-        """Generation time of the newest message since the entry of the receiver [s]."""
+        """Generation time of the newest message since the entry of both stations [s]."""
+        self._left: dict[str, float] = {}
+        """Time at which a station has left for the last time [s]; ages ignore its messages up to then."""
         self._ages = AgeOfInformation()
 
     def record(self, receiver: str, entries: Sequence[Entry]) -> None:
@@ -191,10 +193,15 @@ class ReceptionLog:
         if self._number > MAX_PENDING:
             self._process_pending()
 
-    def end_links(self, receiver: str, now: float) -> None:
-        """End the age of information of a receiver that has left at `now` [s], until its next reception."""
+    def end_links(self, station: str, now: float) -> None:
+        """End the age of information of the links of a station that has left at `now` [s], until their next reception.
+
+        Messages in flight from it do not count as one.
+        """
         self._process_pending()
-        codes = np.array([*self._codes.get(receiver, {}).values()], dtype=np.int64)
+        self._left[station] = now
+        sent = [senders[station] for senders in self._codes.values() if station in senders]
+        codes = np.array([*self._codes.get(station, {}).values(), *sent], dtype=np.int64)
         codes = codes[np.isfinite(self._newest_present[codes])]
         self._ages.end(codes, now - self._newest_present[codes])
         self._newest_present[codes] = -np.inf
@@ -228,6 +235,7 @@ class ReceptionLog:
         codes = np.array(link_codes, dtype=np.int64)
         generated = np.array([entry[4].message.generated for entry in received], dtype=float)
         arrived = np.array([entry[0] for entry in received], dtype=float)
+        left = np.array([self._left.get(entry[1], -math.inf) for entry in received])
         delay = arrived - np.array([entry[3] for entry in received], dtype=float)
         self._pending, self._number = [], 0
         _extend_fields(
@@ -237,7 +245,9 @@ class ReceptionLog:
         np.add.at(self._received, codes, 1)
         np.add.at(self._delay_sum, codes, delay)
         np.maximum.at(self._delay_max, codes, delay)
-        self._record_ages(codes, generated, arrived)
+        np.maximum.at(self._newest, codes, generated)
+        counted = generated > left
+        self._record_ages(codes[counted], generated[counted], arrived[counted])
 
     def _record_ages(self, codes: Integers, generated: Array, arrived: Array) -> None:
         """Update the age of information with messages that are newer than all earlier ones of their link."""
@@ -246,7 +256,6 @@ class ReceptionLog:
         before = np.maximum(_largest_before(codes, generated), self._newest_present[codes])
         fresh = generated > before
         self._ages.record_updates(codes[fresh], (arrived - generated)[fresh], (arrived - before)[fresh])
-        np.maximum.at(self._newest, codes, generated)
         np.maximum.at(self._newest_present, codes, generated)
 
 

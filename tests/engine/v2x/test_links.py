@@ -216,8 +216,12 @@ def test_messages_to_a_station_that_left_are_lost_and_not_delivered_later() -> N
     assert (link.sent, link.lost, link.lost_by, link.in_flight) == (1, 1, {"absent": 1}, 0)
 
 
-def test_age_of_information_is_not_counted_while_the_receiver_is_absent() -> None:
-    """Delays of 0.5 s; present up to 3 s and from 60 s on: two equal cycles of ages 0.5 to 1.5 and 0.5 to 2."""
+@pytest.mark.parametrize(("absent", "received"), [("Ego", 4), ("RSU", 5)])
+def test_age_of_information_is_not_counted_while_a_station_is_absent(absent: str, received: int) -> None:
+    """Delays of 0.5 s; present up to 3 s and from 60 s on: two equal cycles of ages 0.5 to 1.5 and 0.5 to 2.
+
+    Message 2 of 2.9 s is in flight when the station leaves: to Ego it is lost, from RSU it arrives, and starts no age.
+    """
     links = Links()
     for begin in (0.0, 60.0):
         for number, second in enumerate((0.0, 1.0)):
@@ -225,9 +229,11 @@ def test_age_of_information_is_not_counted_while_the_receiver_is_absent() -> Non
         for now in (0.5, 1.0, 1.5, 2.0, 2.5, 3.0):
             links.deliver("Ego", begin + now)
         if begin == 0.0:
-            links.remove("Ego")
+            links.send(message("RSU", 2, 2.9), "Ego", 2.9, 1.0)
+            links.remove(absent)
+            links.deliver("Ego", 4.0)
     link = links.statistics(63.0)["RSU", "Ego"]
-    assert link.received == 4
+    assert link.received == received
     assert link.age == 2.0
     assert link.peak_age == pytest.approx(1.5)
     assert link.mean_age == pytest.approx((1.0 + 1.25 * 1.5) / 2.5)
