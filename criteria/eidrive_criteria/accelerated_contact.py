@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-from eidrive_scenario.api.common import WorldView
+from eidrive_scenario.api.common import EPSILON, WorldView
 from eidrive_scenario.api.criteria import half_projection, separating_axes
 
 MAX_ACCELERATION = 15.0
@@ -101,6 +101,8 @@ def _on_axis(phase: _Phase, axis: Vector) -> tuple[float, float, float]:
         sum(part * way for part, way in zip(vector, axis, strict=True))
         for vector in (phase.position, phase.velocity, phase.acceleration)
     )
+    # The speed of a vehicle that has stopped decays to denormal numbers
+    velocity, acceleration = (rate if abs(rate) > EPSILON else 0.0 for rate in (velocity, acceleration))
     return position, velocity, acceleration / 2.0
 
 

@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.geometry import components, points_in_polygon, points_of_boxes
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.evaluation.actor_tracking import LaneTracker, corners
 from eidrive_scenario.roads.objects import crosswalks
 from eidrive_scenario.world.view import WorldView
@@ -84,7 +85,7 @@ def approached_side(before: WorldView, of: str, other: str) -> Side | None:
     longest, side = 0.0, None
     for offset, speed, reach, (positive, negative) in ways:
         gap, closing = abs(offset) - reach, -math.copysign(speed, offset * speed)
-        time = gap / closing if closing > 0.0 else 0.0
+        time = gap / closing if closing > EPSILON else 0.0
         if time > longest:
             longest, side = time, positive if offset > 0.0 else negative
     return side

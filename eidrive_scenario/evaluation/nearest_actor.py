@@ -10,6 +10,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Bools
 from eidrive_scenario.base.geometry import box_distance
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.world.view import WorldView
 
 
@@ -40,7 +41,7 @@ def time_to_contact(a: Sequence[float], b: Sequence[float], velocity: Sequence[f
 
 def _overlap_time(gap: float, reach: float, rate: float) -> tuple[float, float]:
     """Return the interval, not before 0, in which a gap that changes at this rate is within the reach [s]."""
-    if rate == 0.0:
+    if abs(rate) <= EPSILON:  # the speed of a vehicle that has stopped decays to denormal numbers
         return (0.0, math.inf) if abs(gap) <= reach else (math.inf, 0.0)
     first, last = (-reach - gap) / rate, (reach - gap) / rate
     if first > last:

@@ -25,6 +25,7 @@ def box(x: float, y: float = 0.0, yaw: float = 0.0, z: float = 0.75) -> list[flo
         (box(14), (-5, 0, 0), 2.0),  # a gap of 10 m closes at 5 m/s
         (box(14), (5, 0, 0), math.inf),  # away
         (box(14), (0, 0, 0), math.inf),  # standing still
+        (box(14), (-1e-140, 1e-140, 0), math.inf),  # at the decayed speed of a vehicle that has stopped
         (box(14, 2.5), (-5, 0, 0), math.inf),  # passes at 0.5 m
         (box(13, yaw=math.pi / 2), (-5, 0, 0), 2.0),  # broadside: half a length and half a width are 3 m
         (box(0, 13, -math.pi / 2), (0, -5, 0), 2.0),  # crosses into the side: 13 - 1 - 2
@@ -103,6 +104,12 @@ def along_x(speed: float, rate: float = 0.0) -> Course:
         (-1, along_x(5), along_x(5), 0.0),  # overlap
         (20, along_x(15), along_x(10), 4.0),  # constant velocities
         (20, along_x(5), along_x(5, 2), math.inf),  # accelerates away
+        (
+            10,
+            along_x(1e-140, 1e-140),
+            along_x(0),
+            math.inf,
+        ),  # stands, at the decayed speed of a vehicle that has stopped
     ],
 )
 def test_contact_with_accelerations(gap: float, own: Course, lead: Course, expected: float) -> None:
