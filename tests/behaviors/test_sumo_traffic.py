@@ -9,6 +9,7 @@ from __future__ import annotations
 import gc
 import importlib.util
 import math
+import re
 import subprocess
 import sys
 from collections import Counter
@@ -109,6 +110,27 @@ def test_positions_are_those_of_sumo_alone(run: Run, crossing: Callable[..., Rec
     categories = {name: frame.view.categories[row] for frame in played.frames for name, row in frame.view.rows.items()}
     assert categories["sumo.north"] == "truck"
     assert categories["sumo.right"] == "bicycle"
+
+
+@needs_sumo
+def test_pedestrians_of_sumo_are_those_of_sumo_alone(run: Run, crossing: Callable[..., RecordedRun]) -> None:
+    """Random speeds and lateral motion, also with Ego in the world. Walking is allowed on all lanes."""
+    network, routes, output = (run.folder / name for name in ("walk.net.xml", "routes.rou.xml", "fcd.xml"))
+    network.write_text(re.sub(r' (dis)?allow="[^"]*"', "", (DATA / "four_way_signals.net.xml").read_text()))
+    walkers = '<personFlow id="p" begin="0" end="20" period="1"><walk edges="-1"/></personFlow>'
+    last = crossing(walkers, 12.0, init=command("walk.net.xml")).frames[-1].view
+    subprocess.run([sys.executable, "-c", PLAIN, str(network), str(routes), str(output), "330"], check=True)
+    step = next(
+        step
+        for step in ElementTree.parse(output).getroot().iter("timestep")
+        if round(float(step.attrib["time"]) / 0.05) + 1 == round(last.time / 0.05)
+    )
+    expected = {f"sumo.{person.attrib['id']}": person.attrib for person in step.iter("person")}
+    assert len(expected) >= 10
+    for name, values in expected.items():
+        x, y, _, length, _, _, yaw = last.boxes[last.rows[name]].tolist()
+        place = x + 0.5 * length * math.cos(yaw) + OFFSET[0], y + 0.5 * length * math.sin(yaw) + OFFSET[1]
+        assert place == pytest.approx((float(values["x"]), float(values["y"])), abs=1e-3)
 
 
 LEAVES = global_xml('<EntityAction entityRef="Other"><DeleteEntityAction/></EntityAction>')

@@ -234,6 +234,7 @@ class SumoTraffic:
                 for key, value in (("Length", length), ("Width", width), ("Height", height)):
                     getattr(types, f"set{key}")(vehicle, max(value, 0.1))
                 types.setVehicleClass(vehicle, "ignoring")  # on every lane
+                types.setSpeedDeviation(vehicle, 0.0)  # without a draw from the generator of the pedestrians
                 vehicles.add(vehicle, MIRRORED, vehicle)
                 vehicles.setSpeedMode(vehicle, 0)
                 vehicles.setLaneChangeMode(vehicle, 0)
