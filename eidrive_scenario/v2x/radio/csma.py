@@ -24,7 +24,8 @@ CONTENTION_WINDOW = 15
 class Csma(MediumAccess):
     """CSMA/CA: a message starts if the medium was idle for AIFS, or else after AIFS and a number of idle slots.
 
-    Stations that start within one slot of each other cannot sense each other, and their transmissions overlap.
+    Contending stations whose starts are within one slot of each other cannot sense each other, and their transmissions
+    overlap. A station that becomes ready later senses each transmission that has begun, also within its first slot.
 
     A station locks to a message up to its end, unless it is locked or transmits already, or the interference at the
     start is too strong to decode it. It stops to receive when it starts to transmit. Of messages that start at the same
