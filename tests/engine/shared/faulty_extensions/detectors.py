@@ -32,7 +32,7 @@ class HangsInC(Detector):
 
     def detect(self, readings):
         if readings.time >= AFTER:
-            sum(itertools.repeat(0))
+            NATIVE.pthread_mutex_lock(HELD)  # in detect
         return Detections(readings.time)
 
 
@@ -67,7 +67,7 @@ class KillsProcess(Detector):
 class HangsWhenBuilt(Detector):
     def __init__(self):
         while True:
-            pass
+            time.sleep(0.001)
 
     def detect(self, readings):
         return Detections(readings.time)
@@ -75,7 +75,7 @@ class HangsWhenBuilt(Detector):
 
 class HangsInCWhenBuilt(Detector):
     def __init__(self):
-        sum(itertools.repeat(1))
+        NATIVE.pthread_mutex_lock(HELD)  # in __init__
 
     def detect(self, readings):
         return Detections(readings.time)

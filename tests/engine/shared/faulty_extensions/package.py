@@ -9,7 +9,6 @@ from faulty_extensions.stations import STATIONS
 from faulty_extensions.storyboard import STORYBOARD
 
 HEAD = """import ctypes
-import itertools
 import math
 import os
 import signal
@@ -28,6 +27,9 @@ from eidrive_scenario.api.perception import Detections, Detector, Sensor, Sensor
 from eidrive_scenario.api.v2x import LinkChannel, ChannelProfile
 
 AFTER = 0.5  # [s]: the faults begin later than the run
+HELD = ctypes.create_string_buffer(64)  # a mutex that is never released
+NATIVE = ctypes.PyDLL(None)  # native code that keeps the lock of the interpreter
+NATIVE.pthread_mutex_lock(HELD)
 """
 CODE = "\n".join([HEAD, DETECTORS, STATIONS, STORYBOARD])
 """The module `faulty`."""
