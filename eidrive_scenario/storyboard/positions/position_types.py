@@ -209,10 +209,10 @@ def road_position(frame: model.RoadPosition, context: ConditionContext) -> Resol
 def relative_road_position(frame: model.RelativeRoadPosition, context: ConditionContext) -> ResolvedPosition:
     """Resolve a position in the frame of the road of an entity: `ds` along the reference line, `dt` along t."""
     roads, origin = roads_of(frame, context), road_origin(frame, context)
-    here = along_reference(roads, origin, frame.ds, context.actors[frame.entity_ref].motion.route)
-    if here is None:
+    there = along_reference(roads, origin, frame.ds, context.actors[frame.entity_ref].motion.route)
+    if there is None:
         raise position_error(frame, f"beyond the end of the road: {frame.ds:g} m from entity {frame.entity_ref!r}")
-    sign = roads.driving_direction(origin.road, origin.lane) * roads.driving_direction(here.road, here.lane)
+    here, sign = there
     return in_road(roads, here.road, here.s, here.t + frame.dt * sign, frame.orientation)
 
 
@@ -256,21 +256,21 @@ def relative_lane_position(frame: model.RelativeLanePosition, context: Condition
 
 def along_reference(
     roads: RoadNetwork, here: LaneLocation, ds: float, route: Route | None = None
-) -> LaneLocation | None:
+) -> tuple[LaneLocation, int] | None:
     """Return the location at `ds` [m] along the reference line: at the same t of its road, or beyond it at the same
-    offset from the lane connected to that at its end.
+    offset from the lane connected to that at its end. The second result is +1 if s increases there in the direction of
+    s of this road, else -1.
 
     The route selects the branch at junctions.
     """
-    road = roads.roads[here.road]
-    s = here.s + ds
-    if 0.0 <= s <= road.length:
-        return here._replace(s=s)
-    rest = s - road.length if s > road.length else s
-    edge = roads.road_location(here.road, road.length if s > road.length else 0.0, here.t)
-    return roads.advance(
-        edge, rest * roads.driving_direction(here.road, here.lane), route=route, by_reference_line=True
-    )
+    length, s = roads.roads[here.road].length, here.s + ds
+    if 0.0 <= s <= length:
+        return here._replace(s=s), 1
+    way, end = (1, length) if s > length else (-1, 0.0)
+    edge = roads.road_location(here.road, end, here.t)
+    rest = (s - end) * roads.driving_direction(edge.road, edge.lane)
+    there = roads.movement.travel(edge, rest, route, by_reference_line=True)
+    return None if there is None else (there[0], there[1] * way)
 
 
 def count_lanes(lane: int, steps: int) -> int:

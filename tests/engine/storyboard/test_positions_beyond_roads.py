@@ -56,6 +56,48 @@ def test_relative_position_on_the_next_road_is_measured_along_its_reference_line
         assert found.s == pytest.approx(expected[1], abs=1e-6)
 
 
+@pytest.mark.element("RelativeRoadPosition")
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("dt", [0.0, 1.0])
+@pytest.mark.parametrize("ds", [40.0, 60.0, 80.0, -40.0, -60.0, -80.0])
+def test_relative_road_position_beyond_shifted_lanes_keeps_its_direction(
+    context: Any, ds: float, dt: float, turned: bool
+) -> None:
+    """A lane offset of -3.5 m at both ends of the road moves lane 1 to the t of the entity, which is in lane -1.
+
+    Road 2 continues road 1 at the end that `ds` passes, at s = 0 or, if `turned`, with the opposite reference line.
+    """
+    way = 1 if ds > 0.0 else -1
+    other = -1 if turned else 1
+    offsets = "".join(
+        f'<laneOffset s="{s}" a="{a}" b="{b}" c="0" d="0"/>'
+        for s, a, b in ((0, -3.5, 0), (5, -3.5, 0.1), (40, 0, 0), (60, 0, -0.1), (95, -3.5, 0))
+    )
+    lanes = section_xml(
+        *(lane_xml(n, link=lane_links_xml(after=n * other) if way > 0 else lane_links_xml(n * other)) for n in (1, -1))
+    )
+    shifted = f'<laneOffset s="0" a="{-3.5 * other}" b="0" c="0" d="0"/>' + section_xml(lane_xml(1), lane_xml(-1))
+    contact = "start" if way == other else "end"
+    link = successor_xml("2", contact) if way > 0 else predecessor_xml("2", contact)
+    roads = RoadNetwork.parse(
+        map_xml(
+            road_xml("1", link=link, lanes=offsets + lanes),
+            road_xml(
+                "2",
+                x=50.0 + way * (50.0 if contact == "start" else 150.0),
+                hdg=math.pi if turned else 0.0,
+                lanes=shifted,
+            ),
+        )
+    )
+    made = RuntimeContext(context.scenario, roads, dt=0.1, seed=0)
+    here = roads.location("1", -1, 50.0)
+    made.add_actor("A", ResolvedPosition(roads.pose(here), here))
+    frame = model.RelativeRoadPosition(entity_ref="A", ds=ds, dt=dt)
+    pose = resolve_position(model.Position(relative_road_position=frame), made).pose
+    assert (pose.x, pose.y) == pytest.approx((50.0 + ds, -1.75 + dt))
+
+
 @pytest.fixture(scope="module")
 def ring() -> RoadNetwork:
     """Closed track of two roads, half circles with a radius of 50 m, counter-clockwise."""
