@@ -38,7 +38,7 @@ from eidrive_scenario.roads.routing.graph import (
     lane_key,
 )
 from eidrive_scenario.roads.routing.links import LaneLinks, lanes_between
-from eidrive_scenario.roads.routing.movement import Movement
+from eidrive_scenario.roads.routing.movement import Movement, default_rank
 from eidrive_scenario.roads.routing.route import BranchSelector, Route, concatenate_routes
 
 if TYPE_CHECKING:
@@ -380,7 +380,7 @@ class RoadNetwork:
         on one of their lanes. A road user that crosses a junction thus remains on its connecting road.
         """
         if hint is not None and hint.road in self.roads:
-            near = locate_near(self.roads, self.links, x, y, hint)
+            near = locate_near(self.roads, self.movement, x, y, hint)
             if near is not None:
                 return near
         heights = None if z is None else np.array([z])
@@ -422,7 +422,8 @@ class RoadNetwork:
 
         is_on_level = z is None or self.is_on_level(nearest, z)
         is_alone = self.road(nearest.road).junction_id is None and (self.is_level or z is not None)
-        if is_on_level and (is_alone or (hint is not None and deviation(nearest) <= LEAST_GAIN)):
+        is_same = hint is not None and hint.road == nearest.road
+        if is_on_level and (is_alone or (is_same and deviation(nearest) <= LEAST_GAIN)):
             return nearest
         below = [location for location in self.locations_at(x, y) if z is None or self.is_on_level(location, z)]
         if not is_on_level:
@@ -432,14 +433,15 @@ class RoadNetwork:
         if drivable:
             below = [location for location in below if self.lane(location).drivable] or below
         aligned = [location for location in below if angle(location) <= ALIGNED]
-        # Lanes that part later coincide at first: as on the default route, the one on the road with the smallest turn.
-        best = min(aligned, key=lambda location: (round(deviation(location), 3), self._turn(location)), default=nearest)
-        stays = hint is not None and deviation(nearest) <= deviation(best) + LEAST_GAIN
+        # Lanes that part later coincide at first: as on the default route.
+        best = min(aligned, key=lambda location: (round(deviation(location), 3), self._rank(location)), default=nearest)
+        stays = is_same and deviation(nearest) <= deviation(best) + LEAST_GAIN
         return nearest if stays or best[:2] == nearest[:2] else best
 
-    def _turn(self, location: LaneLocation) -> float:
+    def _rank(self, location: LaneLocation) -> float:
         road = self.road(location.road)
-        return abs(wrap_angle(road.reference.at(road.length).h - road.reference.at(0.0).h))
+        turn = wrap_angle(road.reference.at(road.length).h - road.reference.at(0.0).h)
+        return default_rank(turn * road.driving_direction(location.lane), road)
 
     def lane(self, location: LaneLocation) -> Lane:
         """Return the lane of a location. Raise PositionError."""

@@ -7,7 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from opendrive_xml import elevation_xml, map_xml, road_xml
+from opendrive_xml import (
+    elevation_xml,
+    junction_xml,
+    lane_links_xml,
+    lane_xml,
+    map_xml,
+    predecessor_xml,
+    road_xml,
+    section_xml,
+    successor_xml,
+)
 from openscenario_xml import agent_xml, object_xml, road_file_xml, scenario_xml
 from planned_drive import detections
 from signal_street import CAR
@@ -17,7 +27,7 @@ from eidrive_scenario.driving.planning.route_planner import RoutePlanner
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.extensions.library import library_path
 from eidrive_scenario.openscenario import load_scenario, model
-from eidrive_scenario.roads import Road, RoadNetwork
+from eidrive_scenario.roads import LaneLocation, Road, RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
 from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.storyboard.context.runtime_context import RuntimeContext
@@ -95,6 +105,40 @@ def test_location_in_a_junction_moves_to_the_lane_that_the_vehicle_follows(junct
             location = junction.locate_pose(pose.x, pose.y, pose.h, pose.z, location)
         assert location is not None
         assert location.road == road.id
+
+
+@pytest.mark.parametrize(
+    ("rule", "curvatures", "default"),
+    [
+        ("RHT", {"straight": 0.0, "right": -1 / 300.0}, "straight"),
+        ("LHT", {"straight": 0.0, "left": 1 / 300.0}, "straight"),
+        ("RHT", {"left": 1 / 300.0, "right": -1 / 300.0}, "right"),
+        ("LHT", {"left": 1 / 300.0, "right": -1 / 300.0}, "left"),
+    ],
+)
+@pytest.mark.parametrize("reverse", [False, True])
+def test_vehicle_that_enters_a_fork_is_on_the_default_route(
+    rule: str, curvatures: dict[str, float], default: str, reverse: bool
+) -> None:
+    """Lanes that coincide at first part by 0.03 m in 4 m, independently of the order of roads and connections."""
+    lane = -1 if rule == "RHT" else 1
+    link = lane_xml(lane, link=lane_links_xml(lane, lane))
+    lanes = section_xml(*((link,) if lane > 0 else ("", link)))
+    branches = [
+        road_xml(name, x=100.0, curvature=bend, junction="J", link=predecessor_xml("in"), lanes=lanes, rule=rule)
+        for name, bend in curvatures.items()
+    ]
+    way = -1 if reverse else 1
+    start = road_xml("in", link=successor_xml(junction="J"), lanes=lanes, rule=rule)
+    fork = junction_xml("J", "in", dict.fromkeys(list(curvatures)[::way], lane), to=lane)
+    roads = RoadNetwork.parse(map_xml(start, *branches[::way], rest=fork))
+    before, y = roads.location("in", lane, 99.0), 1.75 * lane
+    location: LaneLocation | None = before
+    for x in (101.0, 102.0, 103.0, 104.0):
+        location, entered = roads.locate_pose(x, y, 0.0, None, location), roads.locate_at(x, y, before)
+        assert location is not None
+        assert entered is not None
+        assert (location.road, entered.road) == (default, default)
 
 
 def test_vehicle_handed_over_in_a_junction_stays_on_its_route(junction: RoadNetwork) -> None:

@@ -12,6 +12,7 @@ from eidrive_scenario.roads.model.location import LaneKey, LaneLocation
 from eidrive_scenario.roads.model.road_map import Road
 from eidrive_scenario.roads.routing.graph import JUNCTION_COST
 from eidrive_scenario.roads.routing.links import LaneLinks
+from eidrive_scenario.roads.routing.movement import Movement, default_rank
 
 Chain = Literal["shortest", "fastest", "leastIntersections"]
 """Criterion that selects the chain of roads of a distance."""
@@ -143,9 +144,12 @@ class _Search:
 
 
 def locate_near(
-    roads: Mapping[str, Road], links: LaneLinks, x: float, y: float, hint: LaneLocation
+    roads: Mapping[str, Road], movement: Movement, x: float, y: float, hint: LaneLocation
 ) -> LaneLocation | None:
-    """Return the lane location of a point on the road of `hint` or on an adjacent one, or None if it is on neither."""
+    """Return the lane location of a point on the road of `hint` or on an adjacent one, or None if it is on neither.
+
+    Where several adjacent roads overlap, it is on that of the default route.
+    """
     road = roads[hint.road]
     location = _on(road, x, y, hint.s)
     if location is not None:
@@ -153,10 +157,10 @@ def locate_near(
     ahead = road.driving_direction(hint.lane)
     for direction in (ahead, -ahead):
         last = len(road.sections) - 1 if direction > 0 else 0
-        ways = links.beyond(LaneKey(road.id, last, hint.lane), direction) if hint.lane else ()
-        for other, way in ways:
-            target = roads[other.road]
-            adjacent = _on(target, x, y, 0.0 if way > 0 else target.length)
+        fork = movement.fork(LaneKey(road.id, last, hint.lane), direction) if hint.lane else ()
+        for branch in sorted(fork, key=lambda branch: default_rank(branch.turn, road)):
+            target = roads[branch.lane.road]
+            adjacent = _on(target, x, y, 0.0 if branch.direction > 0 else target.length)
             if adjacent is not None:
                 return adjacent
     return None

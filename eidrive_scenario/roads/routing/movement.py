@@ -27,6 +27,7 @@ class Movement:
         self._roads = roads
         self._links = links
         self._steady: dict[tuple[str, int], SteadyLane] = {}
+        self._forks: dict[tuple[LaneKey, int], tuple[Branch, ...]] = {}
 
     def travel(
         self,
@@ -140,7 +141,7 @@ class Movement:
         if chosen is None and choose is not None:
             chosen = choose(branches)
         if chosen is None:
-            chosen = _default_branch(branches, road)
+            chosen = min(branches, key=lambda branch: default_rank(branch.turn, road))
         return chosen.lane, chosen.direction, 0.0
 
     def _towards(self, route: Route, branches: Sequence[Branch], visit: int) -> Branch | None:
@@ -152,15 +153,21 @@ class Movement:
 
     def branches(self, key: LaneKey, direction: int, with_traffic: bool = True) -> list[Branch]:
         """Return the branches at the end of a lane in the order of the file, preferably those with the traffic."""
-        beyond = list(self._links.beyond(key, direction))
+        fork = self.fork(key, direction)
         wanted = 1 if with_traffic else -1
-        along = [(k, d) for k, d in beyond if self._roads[k.road].driving_direction(k.lane) * d == wanted]
-        beyond = along or beyond
-        if len(beyond) == 1:
-            return [Branch(*beyond[0], 0.0)]
-        road = self._roads[key.road]
-        start = road.reference.at(road.length if direction > 0 else 0.0).h + (0.0 if direction > 0 else math.pi)
-        return [Branch(k, d, wrap_angle(self._exit_heading(k, d) - start)) for k, d in beyond]
+        along = [b for b in fork if self._roads[b.lane.road].driving_direction(b.lane.lane) * b.direction == wanted]
+        return along or list(fork)
+
+    def fork(self, key: LaneKey, direction: int) -> tuple[Branch, ...]:
+        """Return all branches at the end of a lane in the order of the file."""
+        fork = self._forks.get((key, direction))
+        if fork is None:
+            road = self._roads[key.road]
+            start = road.reference.at(road.length if direction > 0 else 0.0).h + (0.0 if direction > 0 else math.pi)
+            beyond = self._links.beyond(key, direction)
+            fork = tuple(Branch(k, d, wrap_angle(self._exit_heading(k, d) - start)) for k, d in beyond)
+            self._forks[key, direction] = fork
+        return fork
 
     def _exit_heading(self, key: LaneKey, direction: int) -> float:
         road = self._roads[key.road]
@@ -201,17 +208,14 @@ class Movement:
         return LaneKey(following.id, index, number), heading_on, shift
 
 
-def _default_branch(branches: Sequence[Branch], road: Road) -> Branch:
-    """Return the branch of the default route at the end of a road (ASAM OpenSCENARIO XML 1.3.1, 6.8.1).
+def default_rank(turn: float, road: Road) -> float:
+    """Return the rank of a turn at a fork; the default route has the smallest (ASAM OpenSCENARIO XML 1.3.1, 6.8.1).
 
     It has the smallest turn. Of a left and a right turn of equal size, it is the right one with right-hand traffic, and
     the left one with left-hand traffic.
     """
-    chosen = min(branches, key=lambda branch: abs(branch.turn))
-    is_far_side = chosen.turn > EQUAL_TURN if road.rule == "RHT" else chosen.turn < -EQUAL_TURN
-    if not is_far_side:
-        return chosen
-    return next((branch for branch in branches if abs(branch.turn + chosen.turn) < EQUAL_TURN), chosen)
+    is_far_side = turn > EQUAL_TURN if road.rule == "RHT" else turn < -EQUAL_TURN
+    return abs(turn) + (EQUAL_TURN if is_far_side else 0.0)
 
 
 def _along_reference_line(
