@@ -42,7 +42,10 @@ BranchSelector = Callable[[Sequence[Branch]], Branch]
 
 
 class Leg(msgspec.Struct, frozen=True):
-    """Part of a route within one lane section: from s to s_end, from one lane to another (usually the same)."""
+    """Part of a route within one lane section: from s to s_end, from one lane to another (usually the same).
+
+    direction  +1 along s, -1 against it, also of a part without length
+    """
 
     road: str
     section: int
@@ -50,11 +53,7 @@ class Leg(msgspec.Struct, frozen=True):
     lane_end: int
     s: float
     s_end: float
-
-    @property
-    def direction(self) -> int:
-        """+1 along s, -1 against it."""
-        return 1 if self.s_end >= self.s else -1
+    direction: int
 
     def contains(self, location: LaneLocation) -> bool:
         """Return whether a location is on the road between both ends, on any lane."""
@@ -105,14 +104,13 @@ class Route:
         for number, group in enumerate(groups):
             road = self.roads[group[0].road]
             section = road.sections[group[0].section]
-            s, s_end = section.s, section.end
-            if (road.driving_direction(group[0].lane) < 0) != self.against_traffic:
-                s, s_end = s_end, s
+            direction = road.driving_direction(group[0].lane) * (-1 if self.against_traffic else 1)
+            s, s_end = (section.s, section.end) if direction > 0 else (section.end, section.s)
             if number == 0:
                 s = self.start.s
             if number == len(groups) - 1:
                 s_end = self.end.s
-            legs.append(Leg(road.id, section.index, group[0].lane, group[-1].lane, s, s_end))
+            legs.append(Leg(road.id, section.index, group[0].lane, group[-1].lane, s, s_end, direction))
         return tuple(legs)
 
     @property
@@ -175,7 +173,7 @@ class Route:
         pose = lane_pose_at(self.roads[location.road], location.lane, location.s, location.offset)
         x, y, _ = self.points_at(np.array([distance - 0.25, distance + 0.25])).T
         if x[0] == x[1] and y[0] == y[1]:
-            return pose
+            return pose.turned(0.0 if self.legs[-1].direction > 0 else math.pi)
         heading = math.atan2(y[1] - y[0], x[1] - x[0])
         return pose.turned(wrap_angle(heading - pose.h))
 
@@ -333,7 +331,8 @@ def _join_legs(groups: Sequence[Sequence[Leg]]) -> tuple[Leg, ...]:
         last = legs[-1]
         changes = [leg for leg in (last, first) if leg.lane != leg.lane_end]
         if not changes or any(abs(leg.s_end - leg.s) < LANE_CHANGE_LENGTH for leg in changes):
-            legs[-1] = Leg(last.road, last.section, last.lane, first.lane_end, last.s, first.s_end)
+            longer = max((last, first), key=lambda leg: abs(leg.s_end - leg.s))
+            legs[-1] = Leg(last.road, last.section, last.lane, first.lane_end, last.s, first.s_end, longer.direction)
         else:
             legs.append(first)
         legs += others

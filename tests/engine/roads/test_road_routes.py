@@ -255,6 +255,32 @@ def test_route_from_start_at_destination_has_length_zero() -> None:
     assert network.route(network.location("a", -1, 31.0), there).length > 300.0
 
 
+@pytest.mark.parametrize("lane", [1, -1])
+@pytest.mark.parametrize(("first", "last"), [(-50.0, 0.0), (0.0, 50.0), (0.0, 0.0)])
+def test_route_that_begins_or_ends_where_roads_meet_leads_ahead(lane: int, first: float, last: float) -> None:
+    """Road a is before x = 0, b behind it: a part of the route on the road behind its start or before its end has no
+    length, and still the direction of its lane, which is against s in lane 1."""
+    lanes = section_xml(lane_xml(1, link=lane_links_xml(1, 1)), lane_xml(-1, link=lane_links_xml(-1, -1)))
+    a, b = (
+        road_xml("a", x=-100.0, link=successor_xml("b"), lanes=lanes),
+        road_xml("b", link=predecessor_xml("a"), lanes=lanes),
+    )
+    roads = RoadNetwork.parse(map_xml(a, b))
+    way = -lane
+
+    def at(x: float, road: str) -> LaneLocation:
+        return roads.location(road, lane, x + 100.0 if road == "a" else x)
+
+    begins, ends = ("a", "b") if way > 0 else ("b", "a")
+    start, end = at(first * way, begins), at(last * way, ends)
+    for via in ([], [start], [end]):
+        route = roads.route(start, end, via)
+        assert [leg.direction for leg in route.legs] == [way, way]
+        assert route.distance(start, end) == pytest.approx((last - first, 0.0))
+        assert route.s_along(end) == pytest.approx(last - first)
+        assert math.cos(route.pose_at(0.0).h) == pytest.approx(way)
+
+
 def round_and_out() -> RoadNetwork:
     """Return road a, which ends at a junction: b leads round to the start of a, c leads out; each is 100 m long."""
     lane = (
