@@ -129,8 +129,8 @@ def test_pedestrians_of_sumo_are_those_of_sumo_alone(run: Run, crossing: Callabl
     assert len(expected) >= 10
     for name, values in expected.items():
         x, y, _, length, _, _, yaw = last.boxes[last.rows[name]].tolist()
-        place = x + 0.5 * length * math.cos(yaw) + OFFSET[0], y + 0.5 * length * math.sin(yaw) + OFFSET[1]
-        assert place == pytest.approx((float(values["x"]), float(values["y"])), abs=1e-3)
+        front = x + 0.5 * length * math.cos(yaw) + OFFSET[0], y + 0.5 * length * math.sin(yaw) + OFFSET[1]
+        assert front == pytest.approx((float(values["x"]), float(values["y"])), abs=1e-3)
 
 
 LEAVES = global_xml('<EntityAction entityRef="Other"><DeleteEntityAction/></EntityAction>')

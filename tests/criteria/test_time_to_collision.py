@@ -104,12 +104,7 @@ def along_x(speed: float, rate: float = 0.0) -> Course:
         (-1, along_x(5), along_x(5), 0.0),  # overlap
         (20, along_x(15), along_x(10), 4.0),  # constant velocities
         (20, along_x(5), along_x(5, 2), math.inf),  # accelerates away
-        (
-            10,
-            along_x(1e-140, 1e-140),
-            along_x(0),
-            math.inf,
-        ),  # stands, at the decayed speed of a vehicle that has stopped
+        (10, along_x(1e-140, 1e-140), along_x(0), math.inf),  # stands; its speed has decayed
     ],
 )
 def test_contact_with_accelerations(gap: float, own: Course, lead: Course, expected: float) -> None:

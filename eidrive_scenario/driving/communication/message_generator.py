@@ -110,7 +110,8 @@ class MessageGenerator:
             self._first = now + self._phase
         if now < self._first - EQUAL:
             return ()
-        etsi, evaluated = self._settings.generation == "etsi", self._evaluation_time(now)
+        etsi = self._settings.generation == "etsi"
+        evaluated = self._evaluation_time(now) if etsi else now
         has_measured = measured > -math.inf
         if not etsi and not self._is_due_by_rate(now):
             return ()

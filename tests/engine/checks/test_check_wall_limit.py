@@ -74,9 +74,9 @@ def test_check_hanging_native_code_exits_with_3(folder: Path) -> None:
     write_scenario(folder / "hangs.xosc", detector="hangs_in_c_when_built")
     code, _, err = check(folder, "hangs.xosc", "--wall-limit", "6")
     assert code == 3
-    place = f"{folder / 'faulty.py'}:{line_of('in __init__')}: detector 'hangs_in_c_when_built'"
+    detector = f"{folder / 'faulty.py'}:{line_of('in __init__')}: detector 'hangs_in_c_when_built'"
     assert err.startswith("check aborted: ")
-    assert f"{place} (faulty:HangsInCWhenBuilt): still running in __init__ after 6 s of wall time" in err
+    assert f"{detector} (faulty:HangsInCWhenBuilt): still running in __init__ after 6 s of wall time" in err
 
 
 @pytest.mark.exhaustive

@@ -99,8 +99,8 @@ def test_aborted_run_of_distribution_does_not_end_other_runs(folder: Path) -> No
 def test_uninterruptible_run_ends_with_exit_code_3(folder: Path) -> None:
     code, out, err = run(folder, "s.xosc", "--detector", "hangs_in_c", "--wall-limit", "6", "--json")
     assert code == 3
-    place = f"{folder / 'faulty.py'}:{line_of('in detect')}: detector 'hangs_in_c' (faulty:HangsInC)"
-    assert f"{place}: still running in detect after 6 s of wall time" in err
+    detector = f"{folder / 'faulty.py'}:{line_of('in detect')}: detector 'hangs_in_c' (faulty:HangsInC)"
+    assert f"{detector}: still running in detect after 6 s of wall time" in err
     assert json.loads(out)["error"]["name"] == "hangs_in_c"
 
 
