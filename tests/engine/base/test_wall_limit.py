@@ -46,8 +46,8 @@ def hung(tmp_path: Path, detector: str) -> WallLimitError:
 @pytest.mark.parametrize(
     ("detector", "name", "time", "lines"),
     [
-        ("hangs", "Hangs", 0.5, ("while readings.time >= AFTER:", "pass")),
-        ("swallows", "Swallows", 0.5, ("while readings.time >= AFTER:", "pass")),
+        ("hangs", "Hangs", 0.5, ("while readings.time >= AFTER:", "time.sleep(0.001)")),
+        ("swallows", "Swallows", 0.5, ("while readings.time >= AFTER:", "time.sleep(0.001)")),
         ("sleeps", "Sleeps", 0.0, ("time.sleep(3600.0)",)),
     ],
 )
