@@ -9,6 +9,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools, Integers, number_in_groups
 from eidrive_scenario.roads.geometry.nearest import NearestPoints
+from eidrive_scenario.roads.geometry.poses import FAR, REFINEMENTS
 from eidrive_scenario.roads.geometry.tables import RoadTables
 from eidrive_scenario.roads.model.location import LaneLocations
 
@@ -239,7 +240,7 @@ class Locator:
     def _refine(
         self, road: Integers, s: Array, x: Array, y: Array, frame: Array | tuple[Array, ...]
     ) -> tuple[Array, Array, Array, Bools]:
-        """Return s, t and the distance beyond an end of the road by Newton's method, and whether s is a fixed point.
+        """Return s, t and the distance beyond an end of the road as `project`, and whether s is a fixed point.
 
         s      (N,) initial values
         frame  `_frame` there
@@ -249,7 +250,8 @@ class Locator:
         open_: Integers | None = None
         """Points whose s is not found yet; None for all."""
         refined_s, refined_t, refined_along, last_change = s, s, s, s
-        for repetition in range(10):
+        low, high = np.full(len(s), -FAR), np.full(len(s), FAR)
+        for repetition in range(REFINEMENTS):
             px, py, cos, sin, curvature, speed = frame if repetition == 0 else self._frame(road, s)
             dx, dy = x - px, y - py
             along, left = cos * dx + sin * dy, cos * dy - sin * dx
@@ -261,8 +263,11 @@ class Locator:
                 stretch = tables.stretch_at(road, s, t, curvature, speed)
             else:
                 stretch = speed * (1.0 - curvature * left)
-            step = along / np.maximum(np.maximum(stretch, 0.2 * speed), 2e-4)
-            moved = np.minimum(np.maximum(s + step, 0.0), length)
+            moved = s + along / np.maximum(np.maximum(stretch, 0.2 * speed), 2e-4)
+            is_between = (low < moved) & (moved < high)
+            low, high = np.where(along > 0.0, s, low), np.where(along > 0.0, high, s)
+            moved = np.where(is_between, moved, (low + high) / 2.0)
+            moved = np.minimum(np.maximum(moved, 0.0), length)
             change = np.abs(moved - s)
             if open_ is None:
                 refined_s, refined_t, refined_along, last_change = moved, t, along, change
@@ -276,6 +281,7 @@ class Locator:
                 break
             open_ = going if open_ is None else open_[going]
             road, s, x, y, length = road[going], moved[going], x[going], y[going], length[going]
+            low, high = low[going], high[going]
         beyond = np.zeros(len(end))
         at_end = ((refined_s <= 0.0) | (refined_s >= end)).nonzero()[0]
         if at_end.size:

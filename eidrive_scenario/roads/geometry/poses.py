@@ -188,15 +188,23 @@ def lane_beside(road: Road, s: float, t: float) -> tuple[LaneSection, Lane, floa
     return section, nearest, abs(offset)
 
 
+REFINEMENTS = 40
+"""Maximum number of iterations of a projection; bisection alone reduces 500 km to 1 µm."""
+FAR = 1e300
+"""Bound of s while the nearest point is not between two iterations."""
+
+
 def project(road: Road, x: float, y: float, s: float) -> tuple[float, float, float]:
     """Return road coordinates s, t of a point and its distance beyond an end of the road [m].
 
-    Newton's method on the distance to the reference line starts from `s`.
+    Newton's method on the distance to the reference line starts from `s`; bisection bounds its steps, as it would
+    oscillate where the curvature jumps.
     """
     length = road.length
     along = across = t = 0.0
+    low, high = -FAR, FAR
     banked = not road.superelevation.is_zero
-    for _ in range(12):
+    for _ in range(REFINEMENTS):
         px, py, h, curvature, speed = road.reference.at(s)
         cos, sin = math.cos(h), math.sin(h)
         along, across = cos * (x - px) + sin * (y - py), cos * (y - py) - sin * (x - px)
@@ -208,8 +216,11 @@ def project(road: Road, x: float, y: float, s: float) -> tuple[float, float, flo
             stretch = banked_tangent(road, s, t, 0.0, curvature, speed).along
         else:
             stretch = speed * (1.0 - curvature * across)
-        step = along / max(stretch, 0.2 * speed, 2e-4)
-        before, s = s, min(max(s + step, 0.0), length)
+        moved = s + along / max(stretch, 0.2 * speed, 2e-4)
+        is_between = low < moved < high
+        low, high = (s, high) if along > 0.0 else (low, s)
+        moved = moved if is_between else (low + high) / 2.0
+        before, s = s, min(max(moved, 0.0), length)
         if abs(s - before) < 1e-7:
             break
     beyond = abs(along) if s <= 0.0 or s >= length else 0.0

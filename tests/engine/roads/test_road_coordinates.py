@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from opendrive_xml import elevation_xml, map_xml, road_xml
+from opendrive_xml import elevation_xml, lanes_xml, map_xml, road_xml
 
 from eidrive_scenario.roads import PositionError, RoadNetwork
 from eidrive_scenario.roads.model import curves
@@ -20,23 +20,23 @@ BANKED = '<superelevation s="0" a="0.1" b="0" c="0" d="0"/>'
 @st.composite
 def plan_views(draw: st.DrawFn) -> ReferenceLine:
     """Draw up to five connected curves."""
-    found: list[Curve] = []
+    pieces: list[Curve] = []
     x, y, h, s, curvature = draw(st.floats(-50, 50)), draw(st.floats(-50, 50)), draw(st.floats(-3, 3)), 0.0, 0.0
     for _ in range(draw(st.integers(1, 5))):
         length = draw(st.floats(5.0, 40.0))
         kind = draw(st.sampled_from(["line", "arc", "spiral", "cubic"]))
         bend = draw(st.floats(-0.03, 0.03))
         if kind == "line":
-            found.append(Arc(s, x, y, h, length))
+            pieces.append(Arc(s, x, y, h, length))
         elif kind == "arc":
-            found.append(Arc(s, x, y, h, length, bend))
+            pieces.append(Arc(s, x, y, h, length, bend))
         elif kind == "spiral":
-            found.append(curves.spiral(s, x, y, h, length, curvature, bend))
+            pieces.append(curves.spiral(s, x, y, h, length, curvature, bend))
         else:
-            found.append(Cubic(s, x, y, h, length, (0, 1, 0, 0), (0, 0, 0.1 * bend / length, 0)))
-        x, y, h, curvature, _ = found[-1].at(length)
+            pieces.append(Cubic(s, x, y, h, length, (0, 1, 0, 0), (0, 0, 0.1 * bend / length, 0)))
+        x, y, h, curvature, _ = pieces[-1].at(length)
         s += length
-    return ReferenceLine(found, s)
+    return ReferenceLine(pieces, s)
 
 
 @st.composite
@@ -100,12 +100,14 @@ def test_locate_inverts_pose_on_random_roads(network: RoadNetwork, data: st.Data
     assert (near.road, near.lane) == (road.id, lane)
     assert (near.s, near.offset, near.t) == pytest.approx((there.s, there.offset, there.t), abs=1e-3)
     assert math.dist(network.lane_pose_at(near.road, near.lane, near.s, near.offset)[:3], pose[:3]) < 0.01
-    found = network.locate_at(pose.x, pose.y)
-    assert found is not None
-    assert math.dist(network.lane_pose_at(found.road, found.lane, found.s, found.offset)[:2], pose[:2]) < 0.01
+    location = network.locate_at(pose.x, pose.y)
+    assert location is not None
+    assert (
+        math.dist(network.lane_pose_at(location.road, location.lane, location.s, location.offset)[:2], pose[:2]) < 0.01
+    )
     if len(network.roads) == 1 and road.length < 60.0:
         # A longer road may intersect itself; its other branch is then a valid result.
-        assert (found.road, found.lane) == (road.id, lane)
+        assert (location.road, location.lane) == (road.id, lane)
 
 
 @pytest.mark.exhaustive
@@ -188,14 +190,14 @@ def test_pose_at_unknown_road_lane_or_s_is_an_error() -> None:
 
 def test_locate_points_outside_the_road() -> None:
     network = RoadNetwork.parse(map_xml(road_xml()))
-    found = network.locate([50.0, 50.0, 103.0, 50.0], [-1.0, 6.0, 1.0, 90.0])
-    assert found.found.tolist() == [True, True, True, False]
-    assert found.lane.tolist() == [-1, 1, 1, 0]
-    assert found.outside[:3] == pytest.approx([0.0, 2.5, 3.0])
-    assert found.outside[3] > 30.0
+    locations = network.locate([50.0, 50.0, 103.0, 50.0], [-1.0, 6.0, 1.0, 90.0])
+    assert locations.found.tolist() == [True, True, True, False]
+    assert locations.lane.tolist() == [-1, 1, 1, 0]
+    assert locations.outside[:3] == pytest.approx([0.0, 2.5, 3.0])
+    assert locations.outside[3] > 30.0
     assert network.locate(50.0, 90.0, reach=100.0).outside == pytest.approx([86.5])
-    assert found.offset[:2] == pytest.approx([0.75, 4.25])
-    assert found.location(3) is None
+    assert locations.offset[:2] == pytest.approx([0.75, 4.25])
+    assert locations.location(3) is None
     beside = network.locate_at(50.0, 6.0)
     assert beside is not None
     assert not network.on_road(beside)
@@ -218,8 +220,8 @@ def test_locate_with_height_separates_bridge_from_road_below() -> None:
     network = RoadNetwork.parse(
         map_xml(road_xml("low"), road_xml("high", x=50.0, y=-50.0, hdg=math.pi / 2, profiles=bridge))
     )
-    found = network.locate([51.0, 51.0], [-1.0, -1.0], [0.2, 6.3])
-    assert [network.tables.ids[index] for index in found.road] == ["low", "high"]
+    locations = network.locate([51.0, 51.0], [-1.0, -1.0], [0.2, 6.3])
+    assert [network.tables.ids[index] for index in locations.road] == ["low", "high"]
     high = network.locate_at(51.0, -1.0, z=6.0)
     assert high is not None
     assert high.road == "high"
@@ -228,6 +230,36 @@ def test_locate_with_height_separates_bridge_from_road_below() -> None:
 def test_locate_with_hint_stays_on_the_same_road() -> None:
     network = RoadNetwork.parse(map_xml(road_xml("a"), road_xml("b", x=50.0, y=-50.0, hdg=math.pi / 2)))
     for name, s in (("a", 49.0), ("b", 48.0)):
-        found = network.locate_at(51.0, -1.0, network.location(name, -1, s))
-        assert found is not None
-        assert found.road == name
+        location = network.locate_at(51.0, -1.0, network.location(name, -1, s))
+        assert location is not None
+        assert location.road == name
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4])
+@pytest.mark.parametrize("radius", [2.0, 3.0, 4.0, 5.0])
+def test_locate_points_on_the_outer_side_of_a_tight_bend(radius: float, count: int) -> None:
+    """A line, a right turn of 90° and a line: points on the left have one foot, which is known by geometry."""
+    turn = radius * math.pi / 2
+    arc = f'<arc curvature="{-1.0 / radius!r}"/>'
+    parts = [(0.0, 0.0, 0.0, 0.0, 20.0, "<line/>"), (20.0, 20.0, 0.0, 0.0, turn, arc)]
+    parts.append((20.0 + turn, 20.0 + radius, -radius, -math.pi / 2, 20.0, "<line/>"))
+    geometry = "".join(
+        f'<geometry s="{s!r}" x="{x!r}" y="{y!r}" hdg="{h!r}" length="{length!r}">{shape}</geometry>'
+        for s, x, y, h, length, shape in parts
+    )
+    lanes = lanes_xml(count, 0)
+    network = RoadNetwork.parse(map_xml(road_xml(length=40.0 + turn, geometry=geometry, lanes=lanes)))
+    rng = np.random.default_rng(1)
+    s, t = rng.uniform(14.0, 26.0 + turn, 400), rng.uniform(0.1, 3.5 * count - 0.1, 400)
+    angle = np.clip((s - 20.0) / radius, 0.0, math.pi / 2)
+    before, after = np.minimum(s - 20.0, 0.0), np.maximum(s - 20.0 - turn, 0.0)
+    x = 20.0 + before + (radius + t) * np.sin(angle)
+    y = -radius - after + (radius + t) * np.cos(angle)
+    locations = network.locate(x, y)
+    assert locations.s == pytest.approx(s, abs=1e-3)
+    assert locations.t == pytest.approx(t, abs=1e-3)
+    hints = np.clip(s + rng.uniform(-2.0, 2.0, 400), 0.0, 40.0 + turn)
+    for n, hint in enumerate(hints):
+        location = network.locate_at(x[n], y[n], network.location("1", 1, hint))
+        assert location is not None
+        assert (location.s, location.t) == pytest.approx((s[n], t[n]), abs=1e-3)
