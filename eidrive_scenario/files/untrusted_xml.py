@@ -120,7 +120,8 @@ def parse_untrusted(
     try:
         _scan(content, limits, refuse)
     except expat.ExpatError as failure:
-        refuse(f"not well-formed XML: {expat.ErrorString(failure.code)}", _SYNTAX_HINT, failure.lineno)
+        hint = _SYNTAX_HINT if content.strip() else "the file is empty"
+        refuse(f"not well-formed XML: {expat.ErrorString(failure.code)}", hint, failure.lineno)
     except (LookupError, ValueError):  # errors of the codec that the file declares
         refuse("the encoding of the file is not supported", _ENCODING_HINT, 1)
     parser = etree.XMLParser(

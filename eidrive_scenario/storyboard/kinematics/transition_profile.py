@@ -23,6 +23,9 @@ PEAK_SECOND_DERIVATIVE = {
 }
 """Maximum second derivative on the unit square; linear has none, and uses that of cubic."""
 
+LEAST_RATE = 1e-12
+"""Rate in place of 0, with which an actor that stands keeps standing."""
+
 
 class TransitionProfile:
     """Value between `start` and `target` as a function of a parameter from 0 to `extent` (time [s] or distance [m])."""
@@ -36,8 +39,8 @@ class TransitionProfile:
 
     @classmethod
     def from_rate(cls, shape: DynamicsShape, start: float, target: float, rate: float) -> TransitionProfile:
-        """Return the transition with maximum slope `rate`, whose sign is ignored."""
-        return cls(shape, start, target, PEAK_SLOPE[shape] * abs(target - start) / max(abs(rate), EPSILON))
+        """Return the transition with maximum slope `rate`, whose sign is ignored; with rate 0 it never ends."""
+        return cls(shape, start, target, PEAK_SLOPE[shape] * abs(target - start) / max(abs(rate), LEAST_RATE))
 
     @classmethod
     def from_second_derivative(

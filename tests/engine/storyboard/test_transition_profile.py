@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import pytest
+from eidrive_behaviors.actions.lane_change import STANDING
 
 from eidrive_scenario.openscenario.model import DynamicsShape
 from eidrive_scenario.storyboard.kinematics.transition_profile import TransitionProfile
@@ -38,6 +39,10 @@ def test_rate_is_the_maximum_slope(shape: Any, extent: Any) -> None:
     transition.advance(extent / 2 - 1e-4)
     before = transition.value
     assert (transition.advance(2e-4) - before) / 2e-4 == pytest.approx(2.0, rel=1e-4)
+
+
+def test_rate_of_zero_leaves_a_standing_actor_at_rest() -> None:
+    assert TransitionProfile.from_rate(DynamicsShape.LINEAR, 0.0, 60.0, 0.0).advance(3600.0) < STANDING
 
 
 def test_second_derivative_limit_is_the_maximum() -> None:
