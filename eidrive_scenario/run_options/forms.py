@@ -65,10 +65,6 @@ class Form:
         """Return the texts that give a value on a command line in any folder; "" for a flag without a value."""
         return [str(value)]
 
-    def resolved(self, value: Any) -> Any:
-        """Return the value among the settings that determine a run."""
-        return value
-
     def recorded(self, value: Any) -> str | None:
         """Return the entry of a recording about a value that the caller gave; None without one."""
         return None if value is None else str(value)
@@ -159,8 +155,8 @@ class Assignments(_Repeated):
         _checked(name, value, (Mapping,), self.expected)
         texts: dict[str, str | Assignment] = {}
         for key, text in value.items():
-            if not isinstance(key, str):
-                raise SettingError(Diagnostic(f"{name} has the name {quoted(key)}", "give a text"))
+            if not isinstance(key, str) or not key or "=" in key:
+                raise SettingError(Diagnostic(f"{name} has the name {quoted(key)}", "give a text without '='"))
             texts[key] = text if _is_assignment(text) else as_setting_text(f"{name}[{key!r}]", text)
         return texts
 
@@ -243,11 +239,11 @@ class Seconds(Form):
     follows_seed: ClassVar[bool] = True
     unit: ClassVar[str] = "s"
 
-    def check(self, name: str, value: Any) -> Any:
-        _checked(name, value, (Real,), "a number of seconds")
-        if self.is_positive and not value > 0.0:
+    def check(self, name: str, value: Any) -> float:
+        seconds = float(_checked(name, value, (Real,), "a number of seconds"))
+        if self.is_positive and not 0.0 < seconds < math.inf:
             raise SettingError(Diagnostic(f"{name} is {value}", "give a positive number of seconds"))
-        return value
+        return seconds
 
     def parse(self, flag: str, given: float) -> float:
         check_seconds(flag, given)
@@ -268,10 +264,7 @@ class Seconds(Form):
         return float(value)
 
     def texts(self, value: float) -> list[str]:
-        return [repr(float(value))]
-
-    def resolved(self, value: float) -> float:
-        return float(value)
+        return [repr(value)]
 
 
 class Switch(Form):

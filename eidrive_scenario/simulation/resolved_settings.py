@@ -126,7 +126,7 @@ def resolve_settings(setup: RunSetup, seed: int, settings: RunSettings) -> Resol
             *(("criteria", declaration.kind) for declaration in [*declared, *added]),
         ]
     )
-    values: dict[str, Any] = {option.name: option.form.resolved(getattr(settings, option.name)) for option in OPTIONS}
+    values: dict[str, Any] = {option.name: getattr(settings, option.name) for option in OPTIONS}
     values |= {
         "channel": resolved.channel,
         "weather": weather.name if weather is not None else None,

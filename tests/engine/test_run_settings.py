@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import warnings
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
 
@@ -13,6 +14,7 @@ import pytest
 from eidrive_scenario.api.run import load_for_seed, load_scenario
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.experiments.single_run import run_and_save
+from eidrive_scenario.run_options.table import option_of
 from eidrive_scenario.simulation import RunSettings, Simulation, run_file
 
 ONE = "coop/scenario_1"
@@ -104,9 +106,18 @@ def test_senders_as_single_text_raise() -> None:
         RunSettings(cooperate="RSU")  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("limit", [0.0, -1.0, float("nan")])
-def test_nonpositive_time_limit_raises(limit: float) -> None:
-    """A run up to a time that is not a number would never end."""
+@pytest.mark.parametrize("step", [np.float32(0.05), Fraction(1, 20)])
+def test_time_step_is_the_number_of_its_command(step: Any) -> None:
+    """The float nearest to the given number. An equal number of another type would be left out of the command."""
+    settings = RunSettings(dt=step)
+    assert type(settings.dt) is float
+    words = option_of("dt").words(settings.dt)
+    assert settings.dt == (float(words[1]) if words else 0.05) == float(step)
+
+
+@pytest.mark.parametrize("limit", [0.0, -1.0, float("nan"), float("inf")])
+def test_nonpositive_or_infinite_time_limit_raises(limit: float) -> None:
+    """A run up to a time that is not a number would never end, and no command line has an infinite one."""
     with pytest.raises(SettingError, match=r"time_limit is .*; give a positive number of seconds"):
         RunSettings(time_limit=limit)
 
@@ -130,8 +141,11 @@ def test_nonpositive_time_limit_raises(limit: float) -> None:
         ("parameters", {"EgoSpeed": None}),
         ("user_values", "alarm"),
         ("user_values", {"alarm": [1]}),
+        ("user_values", {"alarm=on": "1"}),
+        ("user_values", {"": "1"}),
         ("controllers", {"EgoStack": 5.0j, 1: "external"}),
         ("controllers", "external"),
+        ("controllers", {"EgoStack=1": "external"}),
         ("allow_torchscript", "no"),
         ("allow_torchscript", 1),
     ],
