@@ -158,6 +158,10 @@ def main() -> None:
             flush_output()
     except BrokenPipeError as error:
         raise SystemExit(BROKEN_PIPE) from error
+    except SystemExit as error:
+        if isinstance(error.__context__, BrokenPipeError):  # typer ends help and version with 1
+            raise SystemExit(BROKEN_PIPE) from error
+        raise
     except OSError as error:
         # Help and usage errors are printed before a command runs.
         print_error(error)

@@ -56,7 +56,7 @@ class RunResult:
     final_state: tuple[str, ...] = ()
     """State of the storyboard and last decision of each driven station at the end of the run, as lines of text."""
     command: str = ""
-    """Command line that reproduces the run; empty for a scenario without a file."""
+    """Command line that reproduces the run; empty for a scenario without a file, and from `run_file`."""
     folder: Path | None = None
     """Folder of `result.json`; None if it was not written."""
     recording: Path | None = None

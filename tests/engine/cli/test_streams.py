@@ -152,7 +152,7 @@ def test_closed_standard_output_is_not_an_error(passing_by: Path, arguments: lis
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("arguments", [["run", "--help"], ["list", "criteria"]])
+@pytest.mark.parametrize("arguments", [["--version"], ["run", "--help"], ["list", "criteria"]])
 def test_reader_that_closes_the_pipe_is_not_an_error(arguments: list[str]) -> None:
     reader, writer = os.pipe()
     os.close(reader)
