@@ -149,6 +149,12 @@ def sweep(
         is_distribution=kind == "distribution",
     )
     jobs = Shard(plan, *((1, 1) if shard is None else parse_shard(shard)))
+    if search is not None:
+        search.check(plan)
+    if dry_run and search is not None:
+        axes = search.axes + search.fixed
+        echo(f"at most {counted(search.runs, 'run')} of {scenario}: search over {', '.join(map(str, axes))}")
+        raise typer.Exit
     if dry_run:
         echo(
             f"{counted(len(jobs), 'run')} of {scenario}: {counted(len(plan.points), 'combination')}, "

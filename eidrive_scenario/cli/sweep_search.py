@@ -97,6 +97,14 @@ class Search:
         """Axes whose values the search selects."""
         return self.space if self.boundary is None else (self.boundary,)
 
+    def check(self, plan: SweepPlan) -> None:
+        """Raise SettingError for a distribution of several runs, or without axes."""
+        if len(plan.points) > 1:
+            text = f"{plan.scenario}: a search needs one scenario (got a distribution of {len(plan.points)} runs)"
+            raise SettingError(Diagnostic(text, "give the scenario of the distribution, and --vary or --param"))
+        if not self.axes:
+            raise SettingError(Diagnostic("--falsify without --vary", "give the axes of the space"))
+
     def run(
         self,
         plan: SweepPlan,
@@ -107,11 +115,7 @@ class Search:
         retry: bool,
         files: KeptFiles | None = None,
     ) -> None:
-        """Search, and print the result. Raise SettingError for a distribution of several runs."""
-        if len(plan.points) > 1:
-            text = f"{plan.scenario}: a search needs one scenario (got a distribution of {len(plan.points)} runs)"
-            raise SettingError(Diagnostic(text, "give the scenario of the distribution, and --vary or --param"))
-
+        """Search, and print the result."""
         unjudged: dict[str, StoredRun] = {}
 
         def execute(jobs: Sequence[SweepJob]) -> list[StoredRun]:

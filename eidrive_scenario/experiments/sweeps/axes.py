@@ -63,6 +63,11 @@ class Axis:
     is_whole: bool = False
     texts: tuple[str, ...] = ()
 
+    def __str__(self) -> str:
+        """Return the axis as in `--vary`, a range as its values."""
+        values = map(text_of_value, self.values)
+        return f"{self.name}={f'{self.low:g}:{self.high:g}' if self.is_interval else ','.join(self.texts or values)}"
+
     @property
     def is_interval(self) -> bool:
         """Whether the axis is an interval without single values."""
@@ -330,7 +335,7 @@ def _grid(axes: Sequence[Axis], samples: int | None) -> list[Point]:
         raise SettingError(Diagnostic("--samples has no effect in a grid", "select --design lhs or sobol"))
     for axis in axes:
         if axis.is_interval:
-            hint = f"give a step ({axis.name}={axis.low:g}:{axis.high:g}:STEP), or --design lhs or sobol"
+            hint = f"give a step ({axis}:STEP), or --design lhs or sobol"
             raise SettingError(Diagnostic(f"--vary: {axis.name} is an interval in a grid", hint))
     count = int(np.prod([len(axis.values) for axis in axes], dtype=np.float64))
     if count > MOST_POINTS:

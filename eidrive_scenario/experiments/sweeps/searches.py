@@ -258,10 +258,8 @@ def falsify(
     shown      function that gets the numbers of different runs and of failures after each batch
 
     The sampler may propose a combination of lists again; it counts once.
-    Raise SettingError without Optuna, without axes, or if no run of a batch has a verdict or the objective.
+    Raise SettingError without Optuna, or if no run of a batch has a verdict or the objective.
     """
-    if not axes:
-        raise SettingError(Diagnostic("--falsify without --vary", "give the axes of the space"))
     optuna = optional_import("optuna", "search")
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     with warnings.catch_warnings():

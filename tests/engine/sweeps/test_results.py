@@ -244,6 +244,15 @@ def test_sweep_command_prints_why_runs_have_no_verdict(eidrive: Eidrive, scenari
     assert "2 already in the store (1 invalid, 1 passed)" in again.stdout
 
 
+def test_dry_run_of_a_search_prints_axes_and_maximum(eidrive: Eidrive, scenario: Path) -> None:
+    """The default maximum is 200 runs."""
+    text = f"runs of {scenario}: search over"
+    falsified = eidrive("sweep", scenario, "--vary", "Speed=5:15", "--vary", "dt=0.05,0.1", "--falsify", "--dry-run")
+    assert falsified.stdout == f"at most 200 {text} Speed=5:15, dt=0.05,0.1\n"
+    fixed = ("--find-boundary", "Speed=10:30", "--vary", "dt=0.1", "--runs", "24")
+    assert eidrive("sweep", scenario, *fixed, "--dry-run").stdout == f"at most 24 {text} Speed=10:30, dt=0.1\n"
+
+
 def test_find_boundary_command_prints_value(eidrive: Eidrive, scenario: Path, tmp_path: Path) -> None:
     """The limit of the criterion is 20 m/s."""
     options = ("--find-boundary", "Speed=10:30", "--tolerance", "0.5", "--store", tmp_path / "s.db", "--workers", "1")

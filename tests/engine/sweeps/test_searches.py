@@ -127,8 +127,10 @@ def test_falsify_counts_equal_runs_once(plan: SweepPlan) -> None:
 
 
 def test_falsify_without_axes_raises(plan: SweepPlan) -> None:
+    search = Search.of((), None, None, None, True, None, None)
+    assert search is not None
     with pytest.raises(SettingError, match="without --vary"):
-        falsify(plan, (), executed(lambda job: {"passed": True}), runs=20)
+        search.check(plan)
 
 
 def test_most_different_are_far_apart(plan: SweepPlan) -> None:
