@@ -37,7 +37,7 @@ SETTINGS = {option.name: option for option in OPTIONS if option.form.has_axis}
 """Settings of a run that may vary; all other names are parameters of the scenario."""
 DESCRIPTIVE = frozenset({"name", "description"})
 """Settings of a channel profile that have no effect on runs."""
-_KINDS = {("delay", "seconds"): "constant", ("loss", "probability"): "bernoulli"}
+_KINDS = {"delay.seconds": "constant", "loss.probability": "bernoulli"}
 """Kind of a part of a channel that is selected if the part has no such setting: constant delay, independent losses."""
 _REPEATED = "a value is given twice"
 _RANGE_SIGN = re.compile(r"\s*(?:\.{2,3}|…|:|\bto\b)\s*")
@@ -226,16 +226,15 @@ def changed_profile(profile: Mapping[str, Any], changes: Mapping[str, Scalar]) -
     delay, and `loss.probability` independent losses. The name of the profile is removed.
     """
     changed: dict[str, Any] = {key: value for key, value in profile.items() if key not in DESCRIPTIVE}
-    for path, value in changes.items():
+    for path, value in sorted(changes.items(), key=lambda change: change[0] not in _KINDS):  # before other settings
         *parts, last = path.split(".")
         inner = changed
         for part in parts:
             held = inner.get(part)
             inner[part] = inner = dict(held) if isinstance(held, Mapping) else {}
-        kind = _KINDS.get((parts[-1], last)) if len(parts) == 1 else None
-        if kind is not None and last not in inner:
+        if path in _KINDS and last not in inner:
             inner.clear()
-            inner["kind"] = kind
+            inner["kind"] = _KINDS[path]
         inner[last] = value
     return changed
 
@@ -301,7 +300,7 @@ def points_of(axes: Sequence[Axis], design: str, samples: int | None, seed: int)
     """Return the combinations of a design; one without axes.
 
     design   one of DESIGNS. The grid contains all combinations of lists and ranges; the last axis varies fastest
-    samples  number of sampled combinations
+    samples  number of sampled combinations, of which equal ones count once
     seed     seed of the sampling
 
     Raise SettingError for an unknown design, an interval in a grid, or a number of samples that does not fit.
@@ -327,7 +326,8 @@ def points_of(axes: Sequence[Axis], design: str, samples: int | None, seed: int)
     else:
         # The first points of a longer sequence are those of a shorter one, so that more samples add points.
         shares = qmc.Sobol(len(axes), rng=rng).random(1 << max(samples - 1, 0).bit_length())[:samples]
-    return [{axis.name: axis.at(float(share)) for axis, share in zip(axes, row, strict=True)} for row in shares]
+    sampled = (tuple(axis.at(float(share)) for axis, share in zip(axes, row, strict=True)) for row in shares)
+    return [{axis.name: value for axis, value in zip(axes, values, strict=True)} for values in dict.fromkeys(sampled)]
 
 
 def _grid(axes: Sequence[Axis], samples: int | None) -> list[Point]:

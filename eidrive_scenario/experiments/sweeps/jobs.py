@@ -283,6 +283,7 @@ def plan_of(
     """
     probes = _with_space(points, space)
     _check_names_of_runs(scenario, probes, settings, is_distribution)
+    count = len(points)
     if is_distribution:
         numbers = range(len(load_distribution(scenario)))
         _check_total(len(numbers) * len(points))  # before the list of them
@@ -304,6 +305,12 @@ def plan_of(
         at = settings_at(without_run(point), settings, profile)
         if isinstance(at.channel, Mapping):
             load_profile(at.channel, origin="--vary: channel")
+    different: dict[str, Point] = {}
+    for point in plan.points[:count]:  # of the first run of a distribution
+        same = different.setdefault(plan.job(0, point, chosen[0]).key, point)
+        if same is not point:
+            texts = (", ".join(f"{name}={value}" for name, value in without_run(at).items()) for at in (same, point))
+            raise SettingError(Diagnostic(f"--vary: {' and '.join(texts)} are the same run", "give one of them"))
     return plan
 
 

@@ -97,6 +97,9 @@ def test_changed_profile_keeps_kind_that_has_the_setting() -> None:
     assert changed_profile(bursty, {"loss.probability": 0.3})["loss"] == {**bursty["loss"], "probability": 0.3}
     fixed = changed_profile({"delay": {"kind": "lognormal", "mean": 0.1, "sd": 0.1}}, {"delay.seconds": 0.2})
     assert fixed["delay"] == {"kind": "constant", "seconds": 0.2}
+    for changes in ({"delay.mean": 0.3, "delay.seconds": 0.2}, {"delay.seconds": 0.2, "delay.mean": 0.3}):
+        both = changed_profile({"delay": {"kind": "lognormal", "mean": 0.1, "sd": 0.1}}, changes)
+        assert both["delay"] == {"kind": "constant", "seconds": 0.2, "mean": 0.3}, "an error of the profile"
     assert changed_profile({"model": "radio"}, {"power": 20, "antenna.gain": 3}) == {
         "model": "radio",
         "power": 20,

@@ -31,6 +31,13 @@ def test_latin_hypercube_has_one_point_in_each_stratum() -> None:
     assert sorted(point["kind"] for point in points) == ["x"] * 10 + ["y"] * 10
 
 
+@pytest.mark.parametrize("design", ["lhs", "sobol"])
+def test_sampled_combinations_of_lists_are_different(design: str) -> None:
+    """Two lists of two values have four combinations; sixteen samples contain each of them."""
+    points = points_of(parse_axes(["a=1,2", "b=x,y"]), design, 16, 1)
+    assert sorted((int(point["a"]), str(point["b"])) for point in points) == [(1, "x"), (1, "y"), (2, "x"), (2, "y")]
+
+
 def test_sobol_is_more_even_than_random_and_extensible() -> None:
     """Discrepancy below that of random points; more samples add points to the former ones."""
     axes = AXES[:2]

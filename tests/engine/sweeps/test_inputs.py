@@ -118,6 +118,15 @@ def test_unknown_axis_of_a_search_raises_before_its_runs(scenario: Path) -> None
         plan_of(scenario, [{}], RunSettings(), space=(Axis("Sped", low=0.0, high=1.0),))
 
 
+def test_combinations_of_equal_settings_raise(scenario: Path, distribution: Path) -> None:
+    """They have one key, so that the store has one row for both."""
+    points, settings = grid("cooperate=Ego,Ego+Ego", "dt=0.05,0.1"), RunSettings(drive="Ego")
+    message = r"^--vary: cooperate=Ego, dt=0\.05 and cooperate=Ego\+Ego, dt=0\.05 are the same run"
+    for path in (scenario, distribution):
+        with pytest.raises(SettingError, match=message):
+            plan_of(path, points, settings, is_distribution=path == distribution)
+
+
 def test_invalid_text_of_axis_is_error_of_vary(scenario: Path) -> None:
     with pytest.raises(InputError, match=r"^RunSettings\.weather: "):
         plan_of(scenario, [{}], RunSettings(weather="hail"))
