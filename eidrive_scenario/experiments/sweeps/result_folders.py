@@ -10,7 +10,7 @@ from typing import Any
 
 import msgspec
 
-from eidrive_scenario.base.content_digest import sha256_of
+from eidrive_scenario.base.content_digest import canonical_json, sha256_of
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError
 from eidrive_scenario.experiments.reported_run import parse_run
 from eidrive_scenario.experiments.sweeps.axes import (
@@ -32,6 +32,8 @@ from eidrive_scenario.simulation.result import typed_parameters
 
 SCENARIO = "scenario"
 """Name of the axis over the scenarios of a folder."""
+_PROFILES = {CHANNEL: "channel_profile", "weather": "weather_profile"}
+"""Axes whose values may be paths of profiles, and the resolved settings with the content of the profiles."""
 
 
 class _Settings(msgspec.Struct):
@@ -96,22 +98,42 @@ def varying(runs: Iterable[StoredRun]) -> list[str]:
 def with_axes(runs: Iterable[StoredRun], axes: Mapping[str, str]) -> Iterator[StoredRun]:
     """Yield runs with these axes only. The settings of a run have the values of axes that its sweep lacks.
 
-    Values of string parameters are texts, also of runs that did not start.
+    Values of string parameters are texts, also of runs that did not start. A profile has the text of the first axis
+    that selects it, such as its path, in place of its name.
 
     axes  names of the axes by `axis_identity`
     """
     runs = list(runs)
+    texts: dict[tuple[str, str], Scalar] = {}
+    for run in runs:
+        for key, profile in _profiles_of(run, axes):
+            if run.point.get(key[0], profile) != profile:
+                texts.setdefault(key, run.point[key[0]])
     strings = {(run.scenario, name) for run in runs for name in _strings_of(run)}
     for run in runs:
         values = {axis_identity(name): value for name, value in run.point.items()}
         if run.settings and not axes.keys() <= values.keys():
             with suppress(ValueError, RecursionError):  # settings of another form
                 values = {**_point(json.loads(run.settings)), **values}
+        for key, profile in _profiles_of(run, axes):
+            if values.get(key[0]) == profile:  # texts stay as they are: combinations with `channel.KEY` may be equal
+                values[key[0]] = texts.get(key, profile)
         point = {name: values[key] for key, name in axes.items() if key in values}
         for name, value in point.items():
             if not is_setting(name) and (run.scenario, name.removeprefix(PARAMETER)) in strings:
                 point[name] = text_of_value(value)
         yield msgspec.structs.replace(run, point=point)
+
+
+def _profiles_of(run: StoredRun, axes: Mapping[str, str]) -> Iterator[tuple[tuple[str, str], str]]:
+    """Yield axis and content, and the name, of the profiles of a run; none without settings, or with those of another
+    form."""
+    names = [name for name in _PROFILES if name in axes]
+    with suppress(ValueError, RecursionError):
+        settings = json.loads(run.settings) if names and run.settings else {}
+        for name in names:
+            if profile := settings.get(_PROFILES[name]):
+                yield (name, canonical_json([settings.get(name), profile])), str(settings.get(name))
 
 
 def _strings_of(run: StoredRun) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ import os
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -74,8 +75,10 @@ def stored_sides(*sides: Sequence[Path], warn: Callable[[str], None] = warnings.
     varied = [name for runs in folders for name in varying(runs)]
     axes = _axes([*(name for runs in stores for run in runs for name in run.point), *varied])
     joined: list[list[StoredRun]] = []
-    for swept, runs in zip(stores, folders, strict=True):
-        last = _last_verdicts((run, Path()) for run in with_axes([*swept, *runs], axes))
+    several = [[*swept, *runs] for swept, runs in zip(stores, folders, strict=True)]
+    every = with_axes(chain.from_iterable(several), axes)
+    for side in several:
+        last = _last_verdicts((run, Path()) for run in islice(every, len(side)))
         joined.append(sorted((run for run, _ in last), key=lambda run: (run.number, run.key)))
     return joined
 

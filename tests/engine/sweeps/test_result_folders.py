@@ -138,6 +138,26 @@ def test_settings_of_a_store_have_the_values_of_axes_of_others(
     assert {run.value_of("dt") for run in reported if run.sweep == str(stores[1])} == {0.05}
 
 
+@pytest.mark.parametrize(
+    ("axis", "profile"),
+    [("channel", "{name: slow, delay: {kind: constant, seconds: 0.3}}"), ("weather", "{wetness: 1}")],
+)
+def test_profile_of_a_file_is_one_value_of_an_axis(
+    eidrive: Eidrive, scenario: Path, tmp_path: Path, axis: str, profile: str
+) -> None:
+    """The runs of the folder are those of the second value of the axis, whose files have another name and path."""
+    file = tmp_path / "own.yaml"
+    file.write_text(profile)
+    store, folder = tmp_path / "s.db", tmp_path / "runs"
+    first = {"channel": "none", "weather": "sunny"}[axis]
+    eidrive("sweep", scenario, "--vary", f"{axis}={first},{file}", "--store", store, "--workers", "1")
+    eidrive("run", scenario, f"--{axis}", file, "--no-record", "--out", folder)
+    for sides in ((store, folder), (folder, store)):
+        comparison = compare(*([side] for side in sides))
+        assert (comparison.verdicts.pairs, comparison.identical, comparison.unpaired) == (1, 1, 1)
+    assert {run.point[axis] for run in stored_runs([folder, store])} == {first, str(file)}
+
+
 def test_interrupted_run_is_aborted(runs: Path) -> None:
     """A recording without a result has the settings of its run; one that has only begun is left out."""
     folders = sorted(path.parent for path in runs.rglob("result.json") if "30.0" in str(path))
