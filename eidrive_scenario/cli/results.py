@@ -54,7 +54,7 @@ def results(
     names = None if by is None else [name.strip() for name in by.split(",")]
     points = summaries(runs, by=names, interval=interval, confidence=confidence)
     mixed = (indistinct(runs), mixed_versions(runs))
-    warnings = (*(f"{text}; a new store keeps them apart" for text in mixed if text), warned(runs))
+    warnings = (*(f"{text}; a new store or folder keeps them apart" for text in mixed if text), warned(runs))
     print_warnings([warning for warning in warnings if warning])
     if csv is not None:
         write_csv(runs, csv)

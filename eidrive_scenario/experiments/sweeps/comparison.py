@@ -209,7 +209,7 @@ def _compared(
 def _by_identity(runs: Sequence[StoredRun], paths: Sequence[Path], axis: str = "") -> dict[Identity, StoredRun]:
     """Return the runs by what they have in common with their partners."""
     if warning := indistinct(runs):
-        hint = "sweep again into a new store, or give a folder of one session only"
+        hint = "sweep again into a new store, or give a folder of one session, or of one scenario in it"
         raise SettingError(Diagnostic(f"{', '.join(map(str, paths))}: {warning}", hint))
     return {partner_identity(run, axis) if axis else identity(run): run for run in runs}
 

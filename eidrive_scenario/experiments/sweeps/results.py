@@ -176,12 +176,15 @@ def _number_first(value: Any) -> tuple[bool, float]:
 
 
 def indistinct(runs: Sequence[StoredRun]) -> str:
-    """Return a warning of runs that differ only in files or in settings that are no axes; empty without such runs."""
+    """Return a warning of runs that differ only in files or in settings that are no axes; empty without such runs.
+
+    Those of two scenarios whose files have one name differ in files, too.
+    """
     count = len(runs) - len({identity(run) for run in runs})
     if not count:
         return ""
     what = "1 run repeats another one" if count == 1 else f"{count} runs repeat other ones"
-    return f"{what} with other options, or after a change of a file"
+    return f"{what} with other options, after a change of a file, or of another scenario whose file has this name"
 
 
 def mixed_versions(runs: Iterable[StoredRun]) -> str:

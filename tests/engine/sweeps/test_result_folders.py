@@ -63,6 +63,22 @@ def test_scenarios_of_a_folder_are_compared_by_seed(eidrive: Eidrive, scenario: 
     assert (between.comparison.verdicts.both, between.comparison.unpaired) == (2, 0)
 
 
+def test_scenarios_of_equal_names_are_a_cause_of_repeated_runs(
+    eidrive: Eidrive, scenario: Path, tmp_path: Path
+) -> None:
+    """The results state the name of the file only; each of the two folders has one run and can be compared."""
+    runs = tmp_path / "runs"
+    for name, limit in (("x", "20"), ("y", "2")):
+        copy = tmp_path / name / scenario.name
+        copy.parent.mkdir()
+        copy.write_text(scenario.read_text().replace("at_most: 20", f"at_most: {limit}"))
+        eidrive("run", copy, "--no-record", "--out", runs / name)
+    assert "1 run repeats another one" in (text := eidrive("results", runs).stderr)
+    assert "another scenario whose file has this name; a new store or folder keeps them apart" in text
+    assert "give a folder of one session, or of one scenario in it" in eidrive("compare", runs, runs).stderr
+    assert compare([runs / "x"], [runs / "y"]).verdicts.only_first == 1
+
+
 def test_folders_are_compared_as_stores(eidrive: Eidrive, runs: Path) -> None:
     (between,) = compare_values([runs], "Speed")
     assert between.comparison is not None
