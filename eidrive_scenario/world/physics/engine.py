@@ -42,7 +42,7 @@ def substeps_per_tick(dt: float, physics_rate: float) -> int:
         raise SettingError(Diagnostic(f"a tick is {dt:g} s long", f"give a dt of at most {MAX_TICK:g} s"))
     count = round(exact)
     if count < 1 or abs(exact - count) > 1e-9 * max(exact, 1.0):
-        message = f"a tick of {dt:g} s is {exact:g} physics steps at {physics_rate:g} Hz"
+        message = f"a tick of {dt:.10g} s is {exact:.10g} physics steps at {physics_rate:g} Hz"
         raise SettingError(Diagnostic(message, f"give a dt that is a multiple of {1.0 / physics_rate:g} s"))
     return count
 

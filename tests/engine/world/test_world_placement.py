@@ -117,6 +117,12 @@ def test_substeps_per_tick_of_a_fraction_is_an_error(dt: float, rate: float) -> 
         World(dt=dt, physics_rate=rate)
 
 
+def test_error_of_a_time_step_shows_the_digits_of_its_cause() -> None:
+    """The nearest number to 0.05 of 32 bits is 0.0500000007450580597, of which 200 Hz has 10.0000001490116119 steps."""
+    with pytest.raises(SettingError, match=r"a tick of 0\.05000000075 s is 10\.00000015 physics steps"):
+        substeps_per_tick(float(np.float32(0.05)), 200.0)
+
+
 def test_set_driven_keeps_motion_and_row(world: World, car: CarFactory) -> None:
     world.add(car("Ego"), Placement(0.0, 0.0, speed=10.0))
     world.add(car("B"), Placement(0.0, 50.0))
