@@ -58,7 +58,7 @@ class OutsideRouteLanes(FollowedCriterion):
         self._lanes.forget()
 
     def follow(self, frame: Frame, row: int, step: Step | None) -> None:
-        if step is None or step.distance <= STILL * step.duration:
+        if step is None or not exceeds(step.distance, STILL * step.duration):
             return
         self._driven += step.distance
         if self._is_outside(frame.view, row):

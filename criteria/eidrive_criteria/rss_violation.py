@@ -9,7 +9,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from eidrive_criteria.folds import exceeds
+from eidrive_criteria.folds import exceeds, falls_below
 from eidrive_criteria.pairs import LeaderSettings, SurroundedCriterion
 from eidrive_scenario.api.criteria import Frame, Relation, SafeDistanceModel, Verdict, actor_never_present
 
@@ -80,7 +80,8 @@ class RssViolation(SurroundedCriterion):
         for relation in self.surroundings.relations(view, self.of, self.others, reach):
             # A body that overlaps from behind is a coupled trailer, or has hit this one.
             behind = relation.ahead < 0.0 and (relation.gap > 0.0 or relation.side_gap == 0.0)
-            if behind or relation.crosses or math.hypot(relation.speed, relation.side_speed) < STANDING:
+            stands = falls_below(math.hypot(relation.speed, relation.side_speed), STANDING)
+            if behind or relation.crosses or stands:
                 continue
             ratio = safety_ratio(self._model, relation)
             if ratio < self._ratio:

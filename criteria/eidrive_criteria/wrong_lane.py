@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from eidrive_criteria.folds import SummedCriterion, SummedSettings
+from eidrive_criteria.folds import SummedCriterion, SummedSettings, exceeds
 from eidrive_scenario.api.common import WorldView
 from eidrive_scenario.api.criteria import LaneTracker
 
@@ -32,7 +32,7 @@ class WrongLane(SummedCriterion):
 
     def increment(self, view: WorldView, row: int, duration: float, distance: float) -> float | None:
         against = drives_against_lane(self.lanes, view, row)
-        return distance if against and distance > STILL * duration else None
+        return distance if against and exceeds(distance, STILL * duration) else None
 
 
 def drives_against_lane(lanes: LaneTracker, view: WorldView, row: int) -> bool:

@@ -14,9 +14,9 @@ from eidrive_scenario.evaluation.actor_tracking import LaneTracker, corners
 from eidrive_scenario.roads.objects import crosswalks
 from eidrive_scenario.world.view import WorldView
 
-STOPPED = 0.05
-"""Maximum speed of a stopped actor [m/s]."""
-BEHIND = math.radians(150.0)
+STOPPED = 0.05 + EPSILON
+"""Maximum speed of a stopped actor [m/s], with the rounding error of its calculation."""
+BEHIND = math.radians(150.0) + EPSILON
 """Angle at the reference point between the direction of travel and the center of an actor beyond which that actor is
 behind."""
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.geometry import components
+from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork
 from eidrive_scenario.roads.geometry.poses import lane_t
 from eidrive_scenario.world.view import WorldView
@@ -110,12 +111,13 @@ class Relation(NamedTuple):
     @property
     def crosses(self) -> bool:
         """Whether the other actor moves across the lane rather than along it."""
-        return abs(self.other_side_speed) > max(abs(self.other_speed), STANDING)
+        return abs(self.other_side_speed) > max(abs(self.other_speed), STANDING) + EPSILON
 
     @property
     def leads(self) -> bool:
         """Whether the other actor is ahead in the path of the actor and neither approaches it nor crosses the path."""
-        return self.ahead > 0.0 and self.side_gap == 0.0 and self.other_speed > -STANDING and not self.crosses
+        approaches = self.other_speed < -STANDING - EPSILON
+        return self.ahead > 0.0 and self.side_gap == 0.0 and not approaches and not self.crosses
 
     @property
     def closing_speed(self) -> float:

@@ -5,12 +5,14 @@ from typing import Any
 
 import pytest
 from eidrive_criteria.average_speed import AverageSpeed, AverageSpeedSettings
+from eidrive_criteria.collision import Collision, CollisionSettings
 from eidrive_criteria.driven_distance import DrivenDistance, DrivenDistanceSettings
 from eidrive_criteria.min_distance import MinDistance, MinDistanceSettings
 from eidrive_criteria.off_road import OffRoad, OffRoadSettings
+from eidrive_criteria.outside_route_lanes import OutsideRouteLanes, OutsideRouteLanesSettings
 from eidrive_criteria.time_headway import TimeHeadway, TimeHeadwaySettings
 
-from eidrive_scenario.api.common import RoadNetwork
+from eidrive_scenario.api.common import Contact, RoadNetwork
 from eidrive_scenario.api.criteria import Criterion, evaluate_criteria
 from eidrive_scenario.simulation import RunSettings, run_file
 
@@ -45,6 +47,39 @@ def test_gap_fulfills_an_equal_limit(frame: Any, car: Any, heading: float) -> No
         TimeHeadway(TimeHeadwaySettings(of="Ego", at_least=0.5)),
     ]
     assert [verdict.passed for verdict in evaluate_criteria([frame(0.0, cars)], criteria)] == [True] * 2
+
+
+def test_stopped_actor_is_not_at_fault_in_any_direction(frame: Any, car: Any) -> None:
+    """At 0.05 m/s the Ego has stopped; at 0.051 m/s it hits with its front."""
+    for yaw in map(math.radians, range(360)):
+        x, y = math.cos(yaw), math.sin(yaw)
+        for speed, faults in ((0.05, 0.0), (0.051, 1.0)):
+            cars = {"Ego": car(0.0, 0.0, yaw, speed), "Bus": car(4.0 * x, 4.0 * y, yaw + math.pi, 4.0)}
+            collision = Collision(CollisionSettings(of="Ego"))
+            evaluate_criteria([frame(0.0, cars, [Contact("Ego", "Bus", (2.0 * x, 2.0 * y, 0.5), 4.0)])], [collision])
+            assert collision.metrics()["collision.at_fault"] == faults
+
+
+def test_leader_that_reverses_slowly_leads_in_any_direction(frame: Any, car: Any) -> None:
+    """A standing actor moves at up to 0.1 m/s; one at 45° to the path does not cross it."""
+    for yaw in map(math.radians, range(360)):
+        for turn, speed in ((0.0, -0.1), (math.pi / 4.0, 5.0), (-math.pi / 4.0, 5.0)):
+            lead = car(8.0 * math.cos(yaw), 8.0 * math.sin(yaw), yaw + turn, speed)
+            (verdict,) = evaluate_criteria(
+                [frame(0.0, {"Ego": car(0.0, 0.0, yaw, 5.0), "Lead": lead})],
+                [TimeHeadway(TimeHeadwaySettings(of="Ego", at_least=2.0))],
+            )
+            assert not verdict.passed
+
+
+def test_standing_actor_drives_no_distance_in_any_direction(frame: Any, car: Any, roads: RoadNetwork) -> None:
+    """80 steps of 0.05 s at 0.02 m/s."""
+    for yaw in map(math.radians, range(0, 360, 10)):
+        steps = [0.02 * 0.05 * tick for tick in range(81)]
+        cars = [car(-60.0 + step * math.cos(yaw), step * math.sin(yaw), yaw, 0.02) for step in steps]
+        criterion = OutsideRouteLanes(OutsideRouteLanesSettings(of="Ego"))
+        evaluate_criteria([frame(0.05 * tick, {"Ego": at}) for tick, at in enumerate(cars)], [criterion], roads)
+        assert criterion.metrics()["outside_route_lanes.Ego.driven"] == 0.0
 
 
 @pytest.mark.parametrize("steps", [3, 6, 7, 12])
