@@ -20,8 +20,8 @@ class EndOfRoadSettings(SummedSettings):
 class EndOfRoad(SummedCriterion):
     """Criterion that fails if the front of the actor is at an end of its lane without continuation.
 
-    The distance to the end is at most `within`, for longer than `at_most`. An actor that stands with its back to the
-    end is not at the end.
+    The distance to the end along the center of the lane is at most `within`, for longer than `at_most`. An actor that
+    stands with its back to the end is not at the end.
     """
 
     settings_type = EndOfRoadSettings
@@ -37,28 +37,26 @@ class EndOfRoad(SummedCriterion):
         location, roads = self.lanes.center(view, row), self.lanes.roads
         if location is None:
             return None
-        road, key = roads.road(location.road), self.lanes.key(location)
         _, _, _, length, _, _, yaw = view.plain_boxes[row]
         ahead = math.cos(yaw - roads.road_pose_at(location.road, location.s).h)
         direction = 1 if ahead >= 0.0 else -1
-        section = road.sections[key.section]
-        left = section.end - location.s if direction > 0 else location.s - section.s
-        front = abs(ahead) * length / 2.0
-        return duration if self._ends(key, direction, left - front) else None
+        reach = abs(ahead) * length / 2.0 + self._within + EPSILON
+        return duration if self._ends(self.lanes.key(location), location.s, direction, reach) else None
 
-    def _ends(self, lane: LaneKey, direction: int, left: float) -> bool:
-        """Return whether all ways along a lane, of which `left` [m] are ahead of the front, end within the distance."""
+    def _ends(self, lane: LaneKey, s: float, direction: int, reach: float) -> bool:
+        """Return whether all ways from s along the center of a lane end within `reach` [m]."""
         roads, ends = self.lanes.roads, False
-        ways, reached = [(lane, direction, left)], {(lane, direction)}
+        ways, reached = [(lane, s, direction, reach)], {(lane, direction)}
         while ways:
-            lane, direction, left = ways.pop()
-            if left > self._within + EPSILON:
+            lane, s, direction, reach = ways.pop()
+            rest = roads.movement.rest(lane, s, direction, reach)
+            if not rest:
                 return False
             following = list(roads.links.beyond(lane, direction))
             ends = ends or not following
-            for way in following:
-                if way not in reached:
-                    reached.add(way)
-                    section = roads.road(way[0].road).sections[way[0].section]
-                    ways.append((*way, left + section.end - section.s))
+            for other, onward in following:
+                if (other, onward) not in reached:
+                    reached.add((other, onward))
+                    section = roads.road(other.road).sections[other.section]
+                    ways.append((other, section.s if onward > 0 else section.end, onward, rest))
         return ends

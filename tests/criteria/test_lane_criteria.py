@@ -10,6 +10,7 @@ from eidrive_criteria.off_road import OffRoad, OffRoadSettings
 from eidrive_criteria.on_sidewalk import OnSidewalk, OnSidewalkSettings
 from eidrive_criteria.outside_route_lanes import OutsideRouteLanes, OutsideRouteLanesSettings
 from eidrive_criteria.wrong_lane import WrongLane, WrongLaneSettings
+from opendrive_xml import lane_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
 
 from eidrive_scenario.api.common import RoadNetwork, SettingError
 from eidrive_scenario.api.criteria import Criterion, Verdict, evaluate_criteria
@@ -173,6 +174,30 @@ def test_end_of_road_with_the_center_on_an_earlier_road(
     """The front is 2 m ahead of the center, and `before` [m] the end of the last road."""
     frames = along(frame, car, 0.0, 0.0, 0.0, x=20.0 + last - 2.0 - before, speed=0.0)
     assert judge(EndOfRoad(EndOfRoadSettings(of="Ego")), frames, chain(20.0, last)).value == value
+
+
+@pytest.mark.parametrize("radius", [14.75, 18.25, 21.75, 25.25])
+@pytest.mark.parametrize("length", [0.5, 40.0])
+@pytest.mark.parametrize(("before", "value"), [(1.0, 1.0), (1.01, 0.0)])
+def test_end_of_road_in_a_curve_is_measured_along_the_lane(
+    frame: Any, car: Any, radius: float, length: float, before: float, value: float
+) -> None:
+    """Lanes around a reference line with a radius of 20 m, of 40 m and a last road; the front is at 2 m of the lane."""
+    lanes = section_xml(
+        "".join(lane_xml(n, link=f'<predecessor id="{n}"/><successor id="{n}"/>') for n in (2, 1)),
+        "".join(lane_xml(n, link=f'<predecessor id="{n}"/><successor id="{n}"/>') for n in (-1, -2)),
+    )
+    x, y, end = 20.0 * math.sin(2.0), 20.0 - 20.0 * math.cos(2.0), 2.0 + length / 20.0
+    roads = RoadNetwork.parse(
+        map_xml(
+            road_xml("a", length=40.0, curvature=0.05, link=successor_xml("b"), lanes=lanes),
+            road_xml("b", length=length, x=x, y=y, hdg=2.0, curvature=0.05, link=predecessor_xml("a"), lanes=lanes),
+        )
+    )
+    for angle, yaw in ((end - (2.0 + before) / radius, 0.0), ((2.0 + before) / radius, math.pi)):
+        at = car(radius * math.sin(angle), 20.0 - radius * math.cos(angle), angle + yaw)
+        frames = [frame(0.5 * n, {"Ego": at}) for n in range(3)]
+        assert judge(EndOfRoad(EndOfRoadSettings(of="Ego")), frames, roads).value == value
 
 
 def test_end_of_road_across_the_lane_refers_to_the_front(frame: Any, car: Any) -> None:

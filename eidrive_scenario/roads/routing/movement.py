@@ -116,6 +116,12 @@ class Movement:
         t += offset
         return LaneLocation(road.id, number, s, offset, t), pose_in_lane(road, section, lane, s, offset, t, sideways)
 
+    def rest(self, key: LaneKey, s: float, direction: int, distance: float) -> float:
+        """Return what is left of a distance from s along the center of a lane at the end of its section [m], or 0."""
+        road = self._roads[key.road]
+        section = road.sections[key.section]
+        return _along(road, section, section.lanes[key.lane], s, 0.0, direction, distance)[1]
+
     def _next_lane(
         self,
         road: Road,
