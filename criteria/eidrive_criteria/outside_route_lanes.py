@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field
 
 from eidrive_criteria.folds import FollowedCriterion, exceeds
@@ -13,9 +13,6 @@ from eidrive_criteria.off_road import ALLOWED
 from eidrive_criteria.wrong_lane import STILL, drives_against_lane
 from eidrive_scenario.api.common import RoadNetwork, WorldView
 from eidrive_scenario.api.criteria import CriterionSettings, Frame, LaneTracker, Step, Verdict, actor_never_present
-
-DIRECTIONS = tuple((math.cos(number * math.pi / 4.0), math.sin(number * math.pi / 4.0)) for number in range(8))
-"""Directions in which the margin around the center is sampled."""
 
 
 class OutsideRouteLanesSettings(CriterionSettings):
@@ -53,6 +50,9 @@ class OutsideRouteLanes(FollowedCriterion):
         super().bind(roads)
         if roads is not None:
             self._lanes = LaneTracker(roads)
+            allowed = [lane.id != 0 and (lane.drivable or lane.type in ALLOWED) for lane in roads.tables.lanes]
+            self._allowed = np.flatnonzero(allowed)
+            """Rows of the drivable and parking lanes."""
 
     def interrupt(self) -> None:
         self._lanes.forget()
@@ -70,8 +70,8 @@ class OutsideRouteLanes(FollowedCriterion):
             return True
         x, y, *_ = view.plain_boxes[row]
         z, margin = view.states[row].z, self._settings.margin
-        points = [(x, y, z), *((x + margin * ahead, y + margin * aside, z) for ahead, aside in DIRECTIONS)]
-        return not any(types & ALLOWED for types in self._lanes.types_at(points))
+        (types,) = self._lanes.types_at([(x, y, z)])
+        return not types & ALLOWED and exceeds(self._lanes.roads.lane_gap(x, y, z, self._allowed, margin), margin)
 
     def verdict(self) -> Verdict:
         limit = self._settings.at_most

@@ -371,6 +371,15 @@ class RoadNetwork:
         """
         return self._locator.overlapped_lanes(x, y, z)
 
+    def lane_gap(self, x: float, y: float, z: float, lanes: Integers, within: float) -> float:
+        """Return the distance in plan view of a point from the nearest of some lanes on its level [m]; 0 on it.
+
+        lanes   rows of `tables`
+        within  distance up to which lanes are searched [m]; without any the result is inf
+        """
+        gaps, heights = self._locator.lane_gaps(x, y, lanes, within)
+        return float(gaps[np.abs(heights - z) <= OTHER_LEVEL].min(initial=np.inf))
+
     def locate_at(
         self, x: float, y: float, hint: LaneLocation | None = None, z: float | None = None, reach: float = REACH
     ) -> LaneLocation | None:

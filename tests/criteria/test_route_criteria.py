@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,10 @@ from eidrive_criteria.outside_route_lanes import OutsideRouteLanes, OutsideRoute
 from eidrive_criteria.route_completion import RouteCompletion, RouteCompletionSettings
 from eidrive_criteria.yield_to_emergency_vehicle import YieldToEmergencyVehicle, YieldToEmergencyVehicleSettings
 from msgspec.structs import replace
+from opendrive_xml import lane_xml, map_xml, road_xml, section_xml
 from pydantic import ValidationError
 
+from eidrive_scenario.api.common import RoadNetwork
 from eidrive_scenario.api.criteria import Criterion, Verdict, evaluate_criteria
 from eidrive_scenario.recording.recorder import Recorder
 from eidrive_scenario.recording.recording import read_recording
@@ -216,6 +219,18 @@ def test_share_outside_the_lanes(frame: Any, car: Any, roads: Any) -> None:
     assert outside(frames, roads, margin=0.8).passed
     assert outside(frames, roads, margin=0).value == pytest.approx((steps[1] + steps[2]) / sum(steps))
     assert outside(frames, roads, at_most=0.3).passed
+
+
+@pytest.mark.parametrize("heading", [0.0, math.pi / 8.0, 1.0, 2.0, 4.0])
+@pytest.mark.parametrize(("margin", "passed"), [(0.0, False), (0.89, False), (0.9, True), (3.0, True), (10.0, True)])
+def test_margin_of_the_lanes_in_any_direction(
+    frame: Any, car: Any, heading: float, margin: float, passed: bool
+) -> None:
+    """The center is 0.9 m beside the only lane, of 2.5 m."""
+    roads = RoadNetwork.parse(map_xml(road_xml(hdg=heading, lanes=section_xml(right=lane_xml(-1, 2.5)))))
+    poses = [roads.road_pose_at("1", 10.0 + 10.0 * second, -3.4) for second in range(6)]
+    frames = [frame(float(n), {"Ego": car(pose.x, pose.y, pose.h, 10.0)}) for n, pose in enumerate(poses)]
+    assert outside(frames, roads, margin=margin).passed is passed
 
 
 def test_lane_of_the_opposite_direction_is_outside(frame: Any, car: Any, roads: Any) -> None:

@@ -198,6 +198,30 @@ class Locator:
         _, first = np.unique(np.column_stack([road, s.round(3)]), axis=0, return_index=True)
         return road[first], s[first], t[first]
 
+    def lane_gaps(self, x: float, y: float, lanes: Integers, within: float) -> tuple[Array, Array]:
+        """Return distance in plan view and height of the nearest point of lanes, at least of those `within` [m].
+
+        lanes  rows of the lanes
+        """
+        tables = self._tables
+        gap = np.hypot(*(self.sample_points - (x, y)).T)
+        near = (gap <= within + self._from_samples).nonzero()[0]
+        near = near[np.argsort(gap[near], kind="stable")]
+        section, first = np.unique(tables.lane_section[self._row[near]], return_index=True)
+        sample, road, at = near[first], tables.section_road[section], np.ones(len(section))
+        s, *_ = self._refine(road, self._s[sample], x * at, y * at, self._frames_at(sample))
+        start = tables.section_start[section]
+        s = np.clip(s, start, start + tables.section_length[section])
+        px, py, cos, sin, *_ = self._frame(road, s)
+        t = (cos * (y - py) - sin * (x - px)) / tables.lateral_axis(road, s)[1]
+        lanes = lanes[np.isin(tables.lane_section[lanes], section)]
+        of = section.searchsorted(tables.lane_section[lanes])
+        s, t, half = s[of], t[of], 0.5 * tables.width.value(lanes, s[of] - start[of])
+        wide = half > 0.0
+        lanes, s, t, half = lanes[wide], s[wide], t[wide], half[wide]
+        pose = tables.lane_poses(lanes, s, np.clip(t - tables.lane_t(lanes, s)[0], -half, half))
+        return np.hypot(pose.x - x, pose.y - y), pose.z
+
     @cached_property
     def _overlaps(self) -> Overlaps:
         return Overlaps(self._tables, self.sample_points, self._road, self._from_samples)
