@@ -36,7 +36,7 @@ STANDING = 0.1
 class RoadOfChain:
     """Road of a chain of lanes.
 
-    start      distance of its start from that of the first road, along the reference lines [m]
+    start      distance of its start from that of the own road of the actor, along the reference lines [m]
     direction  direction in s, 1 or -1
     length     of the road [m]
     lanes      lane of the chain by section index
@@ -48,23 +48,21 @@ class RoadOfChain:
     lanes: Mapping[int, int]
 
     def along(self, s: float) -> float:
-        """Return the distance of s from the start of the first road, along the reference lines [m]."""
+        """Return the distance of s from the start of the own road, along the reference lines [m]."""
         return self.start + (s if self.direction > 0 else self.length - s)
 
 
 @dataclass(frozen=True)
 class LaneChain:
-    """Lanes ahead up to a fork, from the start of the first road on.
+    """Lanes behind and ahead up to a fork.
 
     roads      roads by number, in order
-    length     of the roads along their reference lines [m]
-    along      (N,) distances of sample points along the reference lines [m]
+    along      (N,) distances of sample points from the start of the own road, along the reference lines [m]
     distances  (N,) distances of the sample points along the centers of the lanes [m]
     points     (N, 2) centers of the lanes [m]
     """
 
     roads: Mapping[str, RoadOfChain]
-    length: float
     along: Array
     distances: Array
     points: Array
@@ -128,8 +126,8 @@ class Relation(NamedTuple):
 class LaneCoordinates:
     """Actors in the coordinates of the lane of one of them.
 
-    Chains of lanes reach at least as far beyond the first road as requested, in doublings of RANGE. They are computed
-    when needed.
+    Chains of lanes reach at least as far beyond the own road as requested, in doublings of RANGE, and as far behind it
+    as bodies that are close may be. They are computed when needed.
     """
 
     def __init__(self, roads: RoadNetwork) -> None:
@@ -172,7 +170,7 @@ class LaneCoordinates:
         road = None if there is None else chain.roads.get(there.road)
         if there is None or road is None:
             distance = math.hypot(body[0] - own[0], body[1] - own[1]) - (own[3] + body[3]) / 2.0
-            bends_away = there is not None and CLOSE < distance < chain.length - begun
+            bends_away = there is not None and CLOSE < distance < chain.along[-1] - begun
             return None if bends_away else _straight(view, row, other)
         along = chain.distance(road.along(there.s)) - chain.distance(begun)
         left = (there.t - self._center(road, there.road, there.s)) * road.direction - location.offset * direction
@@ -216,29 +214,30 @@ class LaneCoordinates:
         return lane_t(road, section, section.lanes[chain.lanes[section.index]], s)[0]
 
     def _build(self, key: LaneKey, direction: int, reach: float) -> LaneChain:
-        first = self._roads.roads[key.road]
+        own = self._roads.roads[key.road].length
         lanes = {key.road: {key.section: key.lane}}
-        extents = {key.road: (0.0, direction, first.length)}
-        behind: LaneKey | None = key
-        while behind is not None:  # the lanes before the actor on its road
-            behind = self._next_section(behind, -direction)
-            if behind is not None:
-                lanes[key.road][behind.section] = behind.lane
-        length, way, last = first.length, direction, key
-        while length - first.length <= reach + 2.0 * BESIDE:  # the centers of long bodies are beyond the gap
-            following = self._next_section(last, way)
-            if following is None:
-                ways = list(self._roads.links.beyond(last, way))
-                if len(ways) != 1 or ways[0][0].road in extents:
-                    break
-                following, way = ways[0]
-                road = self._roads.roads[following.road]
-                extents[following.road], lanes[following.road] = (length, way, road.length), {}
-                length += road.length
-            lanes[following.road][following.section] = following.lane
-            last = following
-        roads = {number: RoadOfChain(*extent, lanes[number]) for number, extent in extents.items()}
-        return LaneChain(roads, length, *self._sample(roads))
+        extents = {key.road: (0.0, direction, own)}
+        # The centers of long bodies are beyond the gap.
+        for side, limit in ((1, reach + 2.0 * BESIDE), (-1, 2.0 * BESIDE)):
+            length, way, last = 0.0, side * direction, key
+            while length <= limit:
+                following = self._next_section(last, way)
+                if following is None:
+                    ways = list(self._roads.links.beyond(last, way))
+                    if len(ways) != 1 or ways[0][0].road in extents:
+                        break
+                    following, way = ways[0]
+                    if side < 0 and len(list(self._roads.links.beyond(following, -way))) > 1:
+                        break  # The lane of the actor is one of several after a fork.
+                    road = self._roads.roads[following.road]
+                    start = own + length if side > 0 else -length - road.length
+                    extents[following.road], lanes[following.road] = (start, side * way, road.length), {}
+                    length += road.length
+                lanes[following.road][following.section] = following.lane
+                last = following
+        order = sorted(extents, key=lambda number: extents[number][0])
+        roads = {number: RoadOfChain(*extents[number], lanes[number]) for number in order}
+        return LaneChain(roads, *self._sample(roads))
 
     def _next_section(self, key: LaneKey, direction: int) -> LaneKey | None:
         """Return the lane in the next section of the road: of several, the one with the nearest center."""
@@ -288,9 +287,9 @@ class LaneCoordinates:
 class Surroundings:
     """Relations of one actor to the others.
 
-    Along the lane of the actor up to the first fork, coordinates follow the lane. An actor on another road is placed in
-    straight coordinates if it is within CLOSE or beyond the fork; else it is ignored, as the road does not lead to it.
-    Without roads, or off the road, all coordinates are straight.
+    Along the lane of the actor up to the first fork, ahead and behind, coordinates follow the lane. An actor on another
+    road is placed in straight coordinates if it is within CLOSE or beyond the fork; else it is ignored, as the road
+    does not lead to it. Without roads, or off the road, all coordinates are straight.
     """
 
     def __init__(self, roads: RoadNetwork | None) -> None:

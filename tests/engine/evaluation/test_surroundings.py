@@ -210,3 +210,51 @@ def test_gap_in_a_bend_is_measured_along_the_lane(lane: int, radius: float) -> N
         found = relation(roads, *places)
         assert found.ahead == pytest.approx(radius * math.pi / 3.0, rel=2e-3)
         assert found.leads
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+@pytest.mark.parametrize(("lane", "beside"), [(-2, -1), (-1, -2), (-1, 1), (1, 2), (2, 1)])
+def test_actor_behind_the_border_of_a_road_in_a_curve(lane: int, beside: int, reverse: bool) -> None:
+    """2 m beyond the border of two roads around (0, 40), with a radius of 40 m, to an actor 8 m before the border.
+
+    In half of the cases, s of the first road runs against that of the second one.
+    """
+
+    def lanes(before: int, after: int) -> str:
+        left2, left1, right1, right2 = (
+            lane_xml(n, link=f'<predecessor id="{n * before}"/><successor id="{n * after}"/>') for n in (2, 1, -1, -2)
+        )
+        return section_xml(left2 + left1, right1 + right2)
+
+    def place(number: int, at: float) -> tuple[str, int, float]:
+        if at > 0.0:
+            return "b", number, at
+        return ("a", -number, -at) if reverse else ("a", number, 60.0 + at)
+
+    x, y = -40.0 * math.sin(1.5), 40.0 - 40.0 * math.cos(1.5)
+    first = road_xml("a", length=60.0, x=x, y=y, hdg=-1.5, curvature=0.025, link=successor_xml("b"), lanes=lanes(1, 1))
+    if reverse:
+        link = predecessor_xml("b", "start")
+        first = road_xml("a", length=60.0, hdg=math.pi, curvature=-0.025, link=link, lanes=lanes(-1, 1))
+    link = predecessor_xml("a", "start" if reverse else "end")
+    second = road_xml("b", length=60.0, curvature=0.025, link=link, lanes=lanes(-1 if reverse else 1, 1))
+    roads = RoadNetwork.parse(map_xml(first, second))
+    way = -1 if lane > 0 else 1
+    found = relation(roads, place(lane, 2.0 * way), place(beside, -8.0 * way))
+    own, other = ((n - math.copysign(0.5, n)) * 3.5 for n in (lane, beside))
+    assert found.ahead == pytest.approx(-10.0 * (40.0 - own) / 40.0, rel=2e-3)
+    assert found.left == pytest.approx((other - own) * way)
+    assert found.side_gap == pytest.approx(1.5)
+    assert abs(found.other_side_speed) < 1e-6
+
+
+def test_actor_behind_a_fork_or_a_merge_is_placed_straight() -> None:
+    """The lane behind the Ego forks, with the other branch 30° to the right, or is one of two."""
+    lanes = section_xml(right=lane_xml(-1, link='<predecessor id="-1"/><successor id="-1"/>'))
+    ways = [road_xml(n, x=-100.0, link=successor_xml("c"), lanes=lanes) for n in ("a", "b")]
+    own = road_xml("c", curvature=0.01, link=predecessor_xml("a"), lanes=lanes)
+    branch = road_xml("d", y=-60.0, hdg=-0.5, link=predecessor_xml("a"), lanes=lanes)
+    for roads in (map_xml(*ways, own), map_xml(ways[0], own, branch)):
+        cars = view(Ego=(2.0, -1.75, 0.02, 5.0), Near=(-8.0, -1.75, 0.0, 5.0), Far=(-40.0, -1.75, 0.0, 5.0))
+        aheads = {each.other: each.ahead for each in Surroundings(RoadNetwork.parse(roads)).relations(cars, "Ego")}
+        assert aheads == {"Near": pytest.approx(-10.0 * math.cos(0.02))}
