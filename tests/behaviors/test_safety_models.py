@@ -101,6 +101,20 @@ def test_fsm_metrics_halfway_are_one_half() -> None:
     assert model.critical_safety(ego(), ahead(gap=1.0, closing=-1.0)) == 0.0
 
 
+def test_fsm_with_full_stop_brakes_by_the_metrics_of_each_step() -> None:
+    """Critical from the proactive distance of 52.9 m on. At 10 m, closing by 10 m/s, the critical metric is 1: 6 m/s².
+
+    While braking by 4 m/s² the unsafe distance is 8.5 · 0.75 + 7² / 12 = 10.46 m. The last deceleration applies without
+    the object, too.
+    """
+    model, acceleration = Fsm(full_stop=True), 0.0
+    for step in range(200):
+        seen = [ahead(gap=52.9 if step == 0 else 10.0, closing=10.0)]
+        acceleration = model.decide(ego(20.0, acceleration), seen) or 0.0
+    assert acceleration == -6.0
+    assert model.decide(ego(20.0, acceleration), []) == -6.0
+
+
 def test_fsm_ignores_a_cut_in_that_is_too_late() -> None:
     """3 m lateral gap at 1 m/s takes 3 s. The object is met within 2.9 s (plus 0.1 s) or passed before."""
     model = Fsm()

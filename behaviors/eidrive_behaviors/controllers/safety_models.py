@@ -76,9 +76,8 @@ class MemorylessModel(SafetyModel):
         """Return the braking acceleration after the reaction time [m/s²]; None if the situation is not critical."""
         self._lead = next((candidate for candidate in seen if self.matters(ego, candidate)), None)
         before, lead = self._critical, self._lead
-        self._critical = (before and self.full_stop and ego.speed > 0.0) or (
-            lead is not None and lead.closing > 0.0 and lead.gap > 0.0 and self.critical(ego, lead)
-        )
+        self._critical = lead is not None and lead.closing > 0.0 and lead.gap > 0.0 and self.critical(ego, lead)
+        self._critical = self._critical or (before and self.full_stop and ego.speed > 0.0)
         if not self._critical:
             return None
         if not before:
@@ -186,9 +185,10 @@ class Fsm(MemorylessModel):
 
     def critical(self, ego: EgoKinematics, lead: LeadObject) -> bool:
         """Return True if one of both metrics is above 0."""
-        self._urgency = self.critical_safety(ego, lead)
-        self._caution = self.proactive_safety(ego, lead)
-        return self._urgency + self._caution > 0.0
+        urgency, caution = self.critical_safety(ego, lead), self.proactive_safety(ego, lead)
+        if urgency + caution > 0.0:  # with a full stop, the last ones apply until standstill
+            self._urgency, self._caution = urgency, caution
+        return urgency + caution > 0.0
 
     def braking(self, ego: EgoKinematics) -> float:
         """Return the deceleration by the metrics, limited by the driver's jerk [m/s²]."""
