@@ -380,9 +380,9 @@ def test_lane_change_delayed_by_a_limit_warns(run: Run, speed: float, action: st
     assert warning is None or warning in texts[0]
 
 
-def keep_beside(distance: str, limits: str = "") -> str:
+def keep_beside(distance: str, limits: str = "", frame: str = "road") -> str:
     return f"""<PrivateAction><LateralAction><LateralDistanceAction entityRef="Other" continuous="true" {distance}
-      coordinateSystem="road">{limits}</LateralDistanceAction></LateralAction></PrivateAction>"""
+      coordinateSystem="{frame}">{limits}</LateralDistanceAction></LateralAction></PrivateAction>"""
 
 
 def keep_apart(displacement: str) -> str:
@@ -430,6 +430,19 @@ def test_displacement_follows_the_heading_of_the_reference_in_each_step(
         place = played.at(time)
         for value, wanted in zip((place.x, place.y), expected, strict=True):
             assert wanted is None or value == pytest.approx(wanted, abs=1e-6)
+
+
+@pytest.mark.element("LateralDistanceAction")
+@pytest.mark.parametrize("frame", ["entity", "lane", "road"])
+@pytest.mark.parametrize("limit", ["", "maxSpeed", "maxAcceleration"])
+def test_lateral_distance_of_a_wrong_way_actor_is_reached(scene: RunScene, frame: str, limit: str) -> None:
+    """Ego faces against lane -1, 4 m beside Other in lane -2 (y = -6): 3 m are y = -3."""
+    turned = teleport_xml(lane_position_xml(-1, 500.0, inside=f'<Orientation type="relative" h="{math.pi}"/>'))
+    limits = f'<DynamicConstraints {limit}="4"/>' if limit else ""
+    action = keep_beside('freespace="false" distance="3"', limits, frame)
+    played = scene(8, ("Ego", turned), ("Ego", action, after(0.35)), other=(-2, 300.0, 0.0))
+    assert played.at(8.0).x == pytest.approx(342.0, abs=0.5)
+    assert played.at(8.0).y == pytest.approx(-3.0, abs=0.01)
 
 
 OFF_ROAD = [(-30, -2), (100, -90)]

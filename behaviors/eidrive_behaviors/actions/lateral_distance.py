@@ -70,7 +70,7 @@ class LateralDistanceAction(ActionBehaviour):
         if jumps and self.action.dynamic_constraints is not None:
             jumps, sideways = False, math.copysign(most, sideways)
             self._rate = sideways / dt
-        offset = here.offset * roads.driving_direction(here.road, here.lane) + sideways
+        offset = here.offset * roads.driving_direction(here.road, here.lane) + sideways * motion.direction
         ends = abs(error - sideways) < REACHED and not self.action.continuous
         heading = 0.0 if ends or jumps or abs(motion.speed) <= STANDING else None
         motion.set_lateral_step(LateralStep(offset, heading, shortens_distance=not jumps))
