@@ -380,14 +380,17 @@ def test_lane_change_delayed_by_a_limit_warns(run: Run, speed: float, action: st
     assert warning is None or warning in texts[0]
 
 
+THREE_METERS = 'freespace="false" distance="3"'
+
+
 def keep_beside(distance: str, limits: str = "", frame: str = "road") -> str:
     return f"""<PrivateAction><LateralAction><LateralDistanceAction entityRef="Other" continuous="true" {distance}
       coordinateSystem="{frame}">{limits}</LateralDistanceAction></LateralAction></PrivateAction>"""
 
 
-def keep_apart(displacement: str) -> str:
+def keep_apart(displacement: str, frame: str = "road") -> str:
     return f"""<PrivateAction><LongitudinalAction><LongitudinalDistanceAction entityRef="Other" continuous="true"
-      freespace="false" distance="20" coordinateSystem="road" displacement="{displacement}"/></LongitudinalAction>
+      freespace="false" distance="20" coordinateSystem="{frame}" displacement="{displacement}"/></LongitudinalAction>
       </PrivateAction>"""
 
 
@@ -439,10 +442,30 @@ def test_lateral_distance_of_a_wrong_way_actor_is_reached(scene: RunScene, frame
     """Ego faces against lane -1, 4 m beside Other in lane -2 (y = -6): 3 m are y = -3."""
     turned = teleport_xml(lane_position_xml(-1, 500.0, inside=f'<Orientation type="relative" h="{math.pi}"/>'))
     limits = f'<DynamicConstraints {limit}="4"/>' if limit else ""
-    action = keep_beside('freespace="false" distance="3"', limits, frame)
+    action = keep_beside(THREE_METERS, limits, frame)
     played = scene(8, ("Ego", turned), ("Ego", action, after(0.35)), other=(-2, 300.0, 0.0))
     assert played.at(8.0).x == pytest.approx(342.0, abs=0.5)
     assert played.at(8.0).y == pytest.approx(-3.0, abs=0.01)
+
+
+@pytest.mark.element("LateralDistanceAction", "LongitudinalDistanceAction")
+@pytest.mark.parametrize("lane", [-1, 1])
+@pytest.mark.parametrize(
+    ("action", "x", "y"),
+    [
+        (keep_beside(THREE_METERS, frame="world"), None, -3.0),
+        (keep_beside(f'{THREE_METERS} displacement="rightToReferencedEntity"', frame="world"), None, -9.0),
+        (keep_apart("trailingReferencedEntity", "world"), -20.0, None),
+        (keep_apart("leadingReferencedEntity", "world"), 20.0, None),
+    ],
+)
+def test_distances_along_world_axes_are_kept_in_both_directions(
+    scene: RunScene, action: str, lane: int, x: float | None, y: float | None
+) -> None:
+    """Other stands in lane -2 (y = -6) and faces +x, Ego passes it to +x in lane -1 and to -x in lane 1."""
+    played = scene(4, ("Ego", action), ego=(lane, 500.0, 10.0), other=(-2, 500.0, 0.0))
+    assert x is None or played.at(4.0).x == pytest.approx(500.0 + x)
+    assert y is None or played.at(4.0).y == pytest.approx(y)
 
 
 OFF_ROAD = [(-30, -2), (100, -90)]

@@ -115,6 +115,8 @@ class LateralDistanceAction(ActionBehaviour):
             beside = (theirs.y - mine.y) * math.cos(lane) - (theirs.x - mine.x) * math.sin(lane)
         else:
             beside = distance(self.context, me, other, frame=frame, kind="lateral", freespace=False)
+            if frame == "world" and math.cos(self.context.pose(me).h) < 0.0:
+                beside = -beside
         my_box, their_box = self._boxes()
         return beside + their_box.center.y - my_box.center.y
 

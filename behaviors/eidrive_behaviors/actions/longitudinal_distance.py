@@ -89,14 +89,11 @@ class LongitudinalDistanceAction(ActionBehaviour):
         return stiffness * error - 2.0 * math.sqrt(stiffness) * faster_by
 
     def _gap(self) -> float:
-        return distance(
-            self.context,
-            self.actor.name,
-            self.action.entity_ref,
-            frame=resolve_coordinate_system(self.action.coordinate_system),
-            kind="longitudinal",
-            freespace=self.action.freespace,
-        )
+        """Return the distance to the other entity, positive ahead [m]."""
+        frame = resolve_coordinate_system(self.action.coordinate_system)
+        me, other = self.actor.name, self.action.entity_ref
+        gap = distance(self.context, me, other, frame=frame, kind="longitudinal", freespace=self.action.freespace)
+        return -gap if frame == "world" and math.cos(self.context.pose(me).h) < 0.0 else gap
 
     def _same_way(self) -> float:
         frame = resolve_coordinate_system(self.action.coordinate_system)
