@@ -191,7 +191,8 @@ class TrajectoryCurve:
         along = np.einsum("ni,ni->n", to, vectors)
         clipped = np.clip(along, 0.0, lengths)
         if not self.closed:
-            clipped[0], clipped[-1] = min(along[0], clipped[0]), max(along[-1], clipped[-1])
+            clipped[0] = min(along[0], clipped[0])
+            clipped[-1] = max(along[-1], clipped[-1])
         perpendicular = to - clipped[:, None] * vectors
         return to, clipped, np.einsum("ni,ni->n", perpendicular, perpendicular)
 

@@ -62,6 +62,13 @@ def test_point_is_projected_onto_the_nearest_position(point: tuple[float, float]
     assert way.project(*point) == pytest.approx(place)
 
 
+@pytest.mark.parametrize("x", [-50, 40, 150])
+def test_trajectory_of_one_segment_is_extended_at_both_ends(x: float) -> None:
+    way = polyline((0, 0, None, 0.0), (100, 0, None, 0.0))
+    assert way.project(x, 2) == pytest.approx((x, 2.0))
+    assert way.track(x, 2, x) == pytest.approx(x)
+
+
 def test_closed_polyline_is_not_extended() -> None:
     way = polyline((0, 0, None, None), (3, 0, None, None), (3, 4, None, None), closed=True)
     assert way.project(-1, 0)[0] in (0.0, pytest.approx(12.0))
