@@ -262,15 +262,19 @@ def _moved(scenario: Scenario) -> frozenset[str]:
 
 
 def _moves(action: model.PrivateAction) -> bool:
-    """Whether an action requests a speed, overrides pedals, or assigns another controller. Routes have no speed."""
-    longitudinal, control = action.longitudinal_action, action.controller_action
+    """Whether an action requests a speed, overrides pedals, or assigns another controller.
+
+    Routes have no speed, trajectories with times have one.
+    """
+    longitudinal, control, routing = action.longitudinal_action, action.controller_action, action.routing_action
     if longitudinal is not None:
         speed = longitudinal.speed_action
         absolute = None if speed is None else speed.speed_action_target.absolute_target_speed
         return absolute is None or absolute.value != 0.0
     if control is not None:
         return control.override_controller_value_action is not None or control.assign_controller_action is not None
-    return action.synchronize_action is not None
+    follow = routing.follow_trajectory_action if routing is not None else None
+    return action.synchronize_action is not None or (follow is not None and follow.time_reference.timing is not None)
 
 
 def _groups(scenario: Scenario) -> Iterator[model.ManeuverGroup]:

@@ -35,6 +35,14 @@ ROUTE = private_xml(
     "<RoutingAction><AcquirePositionAction><Position>"
     f"{lane_position_xml(-1, 90)}</Position></AcquirePositionAction></RoutingAction>"
 )
+TRAJECTORY = """<RoutingAction><FollowTrajectoryAction><TrajectoryRef>
+<Trajectory name="way" closed="false"><Shape><Polyline>
+<Vertex time="0"><Position><WorldPosition x="20" y="-2"/></Position></Vertex>
+<Vertex time="9"><Position><WorldPosition x="90" y="-2"/></Position></Vertex></Polyline></Shape></Trajectory>
+</TrajectoryRef><TimeReference>{}</TimeReference><TrajectoryFollowingMode followingMode="position"/>
+</FollowTrajectoryAction></RoutingAction>"""
+TIMED = TRAJECTORY.format('<Timing domainAbsoluteRelative="relative" offset="0" scale="1"/>')
+UNTIMED = TRAJECTORY.format("<None/>")
 THROTTLE = """<ControllerAction><OverrideControllerValueAction>
 <Throttle active="true" value="0.5"/></OverrideControllerValueAction></ControllerAction>"""
 ASSIGNED = controller_xml(name="acc")
@@ -138,10 +146,15 @@ def test_speeds_of_settings_and_init(tmp_path: Path, properties: dict[str, objec
         (events(private_xml(HALT)), False),
         (events(private_xml(THROTTLE)), True),
         (events(private_xml(OTHER)), True),
+        (events(private_xml(TIMED)), True),
+        (events(private_xml(UNTIMED)), False),
         (events(ROUTE), False),
         (events(teleport_xml(lane_position_xml(-1, 50))), False),
     ],
-    ids=["speed", "selection", "other", "triggering", "halt", "throttle", "controller", "route", "teleport"],
+    ids=[
+        *("speed", "selection", "other", "triggering", "halt", "throttle", "controller"),
+        *("timed trajectory", "trajectory", "route", "teleport"),
+    ],
 )
 def test_actions_of_events(tmp_path: Path, story: str, moves: bool) -> None:
     path = write(tmp_path, story=story, properties={"planner": "route"})
