@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from opendrive_xml import lane_links_xml, lane_xml, map_xml, road_xml, section_xml, successor_xml
 from recorded_scene import RunScene
-from storyboard_xml import private_xml, speed_xml
+from storyboard_xml import lane_position_xml, private_xml, speed_xml, teleport_xml
 from street_scene import after, street
 
 from eidrive_scenario.errors import ScenarioError
@@ -82,6 +82,35 @@ def test_alks_motion_is_independent_of_road_directions(scene: RunScene, model: s
         for road in (meeting, street(section_xml(right=lane_xml(-1, 4))))
     )
     assert [rows["Ego"].x for rows in played.rows] == pytest.approx([rows["Ego"].x for rows in plain.rows])
+
+
+@pytest.mark.parametrize("model", ["Regulation", "ReferenceDriver", "RSS", "FSM", "adaptive_cruise"])
+@pytest.mark.parametrize("steps", [(), (("Other", CHANGE),)], ids=["lead", "cut-in"])
+def test_wrong_way_actor_brakes_as_one_in_its_driving_direction(
+    scene: RunScene, model: str, steps: tuple[tuple[str, str], ...]
+) -> None:
+    """The scene is turned by 180° around Ego in lane -1, so that x becomes 1000 - x, and the lane to the right lane 1.
+
+    Other drives slower in front of Ego, or changes from the lane to the right in front of it.
+    """
+    courses = []
+    for sign, turn in ((1, 0.0), (-1, math.pi)):
+        pose = f'<Orientation type="relative" h="{turn}"/>'
+        beside = lane_position_xml(1 if sign < 0 else -2, 500.0 + sign * 40.0)
+        place = beside if steps else lane_position_xml(-1, 500.0 + sign * 40.0, inside=pose)
+        turned = ("Ego", teleport_xml(lane_position_xml(-1, 500.0, inside=pose))), ("Other", teleport_xml(place))
+        played = scene(
+            8,
+            *turned,
+            ("Ego", ON, after(0.2)),
+            *steps,
+            cruise=dict(model=model),
+            controller_model="adaptive_cruise" if model == "adaptive_cruise" else "alks",
+            dt=0.05,
+        )
+        courses.append([sign * (rows["Ego"].x - 500.0) for rows in played.rows[2:]])
+        assert played.at(8).speed < 15.0
+    assert courses[1] == pytest.approx(courses[0])
 
 
 def test_alks_on_a_free_road_returns_to_set_speed_comfortably(scene: RunScene) -> None:

@@ -12,6 +12,7 @@ from eidrive_scenario.api.actions import (
     ControllerModel,
     distance,
     entity_box,
+    facing,
     model,
     property_entries,
     same_way,
@@ -157,16 +158,17 @@ class AdaptiveCruise(ControllerModel):
         context, me = self.context, self.actor.name
         here, there, roads = context.location(me), context.location(name), context.roads
         if roads is not None and here is not None and there is not None:
-            apart = roads.distance(here, there)
+            along, across = roads.distance(here, there) or (0.0, 0.0)
+            ahead = along * facing(context, me, here)
             slower = self.actor.limits()[2]
             reach = max(LOOKOUT, 2.0 * CLOSEST + self._last**2 / slower) if slower > 0.0 else math.inf
-            if apart is not None and 0.0 < apart[0] < reach and abs(apart[1]) < self.lateral_range:
+            if 0.0 < ahead < reach and abs(across) < self.lateral_range:
                 same = (
                     roads.lanes_between(here, there) == 0
                     if here.road == there.road
-                    else self._is_beside_lane(apart[1]) is False
+                    else self._is_beside_lane(across) is False
                 )
-                gap = apart[0] - self._overhang(name)
+                gap = ahead - self._overhang(name)
                 if same and gap > 0.0:
                     return gap
         return self._bumper_gap(name)

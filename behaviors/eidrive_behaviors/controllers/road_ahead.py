@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from eidrive_scenario.api.actions import Actor, ControllerContext, model
+from eidrive_scenario.api.actions import Actor, ControllerContext, facing, model
 from eidrive_scenario.api.common import LaneLocation
 
 Span = tuple[float, float]
@@ -14,7 +14,7 @@ Span = tuple[float, float]
 
 @dataclass(frozen=True)
 class LeadObject:
-    """Object ahead in road coordinates: s along the own driving direction, t to the left of it.
+    """Object ahead in road coordinates: s along the lane in the direction that the actor faces, t to the left of it.
 
     name        name of the entity
     gap         free space along the road [m], 0 if both overlap
@@ -82,8 +82,12 @@ class RoadAhead:
 
     def _observe(self, here: LaneLocation, other: Actor) -> LeadObject | None:
         roads, there = self._context.roads, self._context.location(other.name)
-        apart = roads.distance(here, there) if roads is not None and there is not None else None
-        if roads is None or there is None or apart is None or not 0.0 < apart[0] <= self._reach:
+        distances = roads.distance(here, there) if roads is not None and there is not None else None
+        if roads is None or there is None or distances is None:
+            return None
+        turn = facing(self._context, self._actor.name, here)
+        apart = distances[0] * turn, distances[1] * turn
+        if not 0.0 < apart[0] <= self._reach:
             return None
         width = roads.lane_width(here.road, here.lane, here.s)
         is_same_road = here.road == there.road
@@ -92,7 +96,7 @@ class RoadAhead:
         if not walks and not own and abs(apart[1]) > 1.5 * width:
             return None
         side = math.copysign(1.0, apart[1])
-        way = roads.driving_direction(here.road, here.lane)
+        way = roads.driving_direction(here.road, here.lane) * turn
         along, across = self._velocity(self._actor, here)
         its_along, its_across = self._velocity(other, there)
         moved = (apart[0] + its_along * self._later, apart[1] + its_across * self._later)
@@ -116,7 +120,7 @@ class RoadAhead:
         )
 
     def _relative_heading(self, actor: Actor, location: LaneLocation) -> float:
-        """Return the angle of an actor to the own driving direction at a lane location [rad]."""
+        """Return the angle of an actor to the own direction along the lane at a lane location [rad]."""
         roads = self._context.roads
         assert roads is not None
         lane = roads.lane_pose_at(*location[:4]).h
@@ -126,10 +130,11 @@ class RoadAhead:
         return self._context.pose(actor.name).h - lane - flip
 
     def _way_at(self, here: LaneLocation, location: LaneLocation) -> int:
-        """Return +1 if the own driving direction is that of s on the road of a lane location, else -1."""
+        """Return +1 if the actor faces in the direction of s on the road of a lane location, else -1."""
         roads = self._context.roads
         assert roads is not None
-        return roads.driving_direction(here.road, here.lane) * (roads.orientation(here, location) or 1)
+        way = roads.driving_direction(here.road, here.lane) * facing(self._context, self._actor.name, here)
+        return way * (roads.orientation(here, location) or 1)
 
     def _extents(
         self, actor: Actor, location: LaneLocation, along: float = 0.0, across: float = 0.0
