@@ -60,9 +60,23 @@ def test_infinite_visual_range_and_extreme_wind_are_accepted(run: Run) -> None:
     assert_states_are_finite(played)
 
 
-def test_negative_wind_speed_is_rejected(run: Run) -> None:
-    with pytest.raises(InputError, match=r"scene\.xosc:\d+: speed of Wind is -1; a number of at least 0 is expected"):
-        run(0.2, ("Ego", global_xml(WEATHER.format(wind=-1, fog=100))), driven=False)
+@pytest.mark.parametrize(
+    ("attributes", "inside", "number"),
+    [
+        ("", '<Wind direction="0" speed="-1"/>', "speed of Wind"),
+        ("", '<Fog visualRange="-1"/>', "visualRange of Fog"),
+        ("", '<Sun azimuth="0" elevation="0" illuminance="-1"/>', "illuminance of Sun"),
+        ("", '<Sun azimuth="0" elevation="0" intensity="-1"/>', "intensity of Sun"),
+        ('temperature="-1"', "", "temperature of Weather"),
+        ('atmosphericPressure="-1"', "", "atmosphericPressure of Weather"),
+    ],
+)
+def test_negative_weather_is_rejected(run: Run, attributes: str, inside: str, number: str) -> None:
+    """All have the range [0..inf[ in the standard; temperatures are in Kelvin."""
+    weather = f"<Weather {attributes}>{inside}</Weather>"
+    action = global_xml(f'<EnvironmentAction><Environment name="storm">{weather}</Environment></EnvironmentAction>')
+    with pytest.raises(InputError, match=rf"scene\.xosc:\d+: {number} is -1; a number of at least 0 is expected"):
+        run(0.2, ("Ego", action), driven=False)
 
 
 ON_ROUTE = """<TeleportAction><Position><RoutePosition><RouteRef><Route name="way" closed="false">

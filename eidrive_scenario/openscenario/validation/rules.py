@@ -99,6 +99,7 @@ NOT_NEGATIVE: Mapping[type[model.Element], tuple[str, ...]] = {
     model.Dimensions: ("length", "width", "height"),
     model.DynamicConstraints: _MOTION_LIMITS,
     model.EndOfRoadCondition: ("duration",),
+    model.Fog: ("visual_range",),
     model.FollowTrajectoryAction: ("initial_distance_offset",),
     model.LaneOffsetActionDynamics: ("max_lateral_acc",),
     model.LightState: ("flashing_on_duration", "flashing_off_duration", "luminous_intensity"),
@@ -114,10 +115,12 @@ NOT_NEGATIVE: Mapping[type[model.Element], tuple[str, ...]] = {
     model.RoadCondition: ("friction_scale_factor",),
     model.SpeedProfileEntry: ("time",),
     model.StandStillCondition: ("duration",),
+    model.Sun: ("intensity", "illuminance"),
     model.SynchronizeAction: ("target_tolerance", "target_tolerance_master"),
     model.TargetDistanceSteadyState: ("distance",),
     model.TargetTimeSteadyState: ("time",),
     model.TrafficSignalController: ("delay",),
+    model.Weather: ("temperature", "atmospheric_pressure"),
     model.Wind: ("speed",),
 }
 """Attributes that must be at least 0 by the reference of the standard."""
