@@ -187,6 +187,7 @@ class Simulation:
             self._observers.conclude(result)
             return result
 
+    @attributed
     def tick(self) -> tuple[Frame, str | None]:
         """Execute one time step; return its frame, and the reason if the run ends with it.
 
@@ -194,12 +195,8 @@ class Simulation:
         the end.
         """
         self._check_continues()
-        try:
-            raise_if_limit_reached()
-            return self._tick()
-        except BaseException as error:
-            self.attribute(error)
-            raise
+        raise_if_limit_reached()
+        return self._tick()
 
     def _check_continues(self) -> None:
         if self._ended is not None or self._is_closed:

@@ -88,9 +88,13 @@ def test_error_in_begin_of_observer_names_the_observer() -> None:
             raise RuntimeError("full disk")
 
     watch = Breaks()
-    with pytest.raises(ExtensionError, match=r"observer 'Breaks' at t = 0\.000 s: RuntimeError: full disk"):
+    message = r"observer 'Breaks' at t = 0\.000 s: RuntimeError: full disk"
+    with pytest.raises(ExtensionError, match=message):
         run_file(ONE, observers=[watch])
     assert watch.count == 1
+    for step in (Simulation.tick, Simulation.begin_tick, Simulation.run):
+        with Simulation(ONE, observers=[Breaks()]) as simulation, pytest.raises(ExtensionError, match=message):
+            step(simulation)
 
 
 def test_tick_of_closed_simulation_is_an_error() -> None:
