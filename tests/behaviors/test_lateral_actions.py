@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import Any
 
 import pytest
+from openscenario_xml import round_car_xml
 from recorded_scene import RunScene
 from storyboard_xml import element_state_xml, lane_position_xml, speed_xml, teleport_xml, world_position_xml
 from street_scene import NOTHING, OPENING, after
@@ -446,6 +448,32 @@ def test_lateral_distance_of_a_wrong_way_actor_is_reached(scene: RunScene, frame
     played = scene(8, ("Ego", turned), ("Ego", action, after(0.35)), other=(-2, 300.0, 0.0))
     assert played.at(8.0).x == pytest.approx(342.0, abs=0.5)
     assert played.at(8.0).y == pytest.approx(-3.0, abs=0.01)
+
+
+@pytest.mark.element("LateralDistanceAction")
+@pytest.mark.parametrize(
+    ("action", "lane", "y"),
+    [
+        (keep_beside(THREE_METERS), -1, 1.0),
+        (keep_beside(THREE_METERS), 1, -1.0),
+        (keep_beside('freespace="true" distance="1"'), -1, -4.5),
+        (keep_beside('freespace="true" distance="1"'), 1, -1.5),
+    ],
+)
+def test_lateral_distance_between_boxes_beside_their_reference_points(
+    scene: RunScene, monkeypatch: pytest.MonkeyPatch, action: str, lane: int, y: float
+) -> None:
+    """The box of Other is centered 0.5 m to the left of its reference point: at y = -1.5, or at 1.5 in lane 1.
+
+    With a gap of 1 m the centers of both boxes of 2 m are 3 m apart. Ego stays on the side of its center.
+    """
+
+    def car(name: str, controller: str = "", **limits: Any) -> str:
+        xml = round_car_xml(name, controller, **limits)
+        return xml.replace('<Center x="1.5" y="0"', '<Center x="1.5" y="0.5"') if name == "Other" else xml
+
+    monkeypatch.setattr("recorded_scene.round_car_xml", car)
+    assert scene(1, ("Ego", action), other=(lane, 300.0, 0.0)).at(1.0).y == pytest.approx(y)
 
 
 @pytest.mark.element("LateralDistanceAction", "LongitudinalDistanceAction")

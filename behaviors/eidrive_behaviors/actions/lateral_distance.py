@@ -105,7 +105,10 @@ class LateralDistanceAction(ActionBehaviour):
         return way if left else -way
 
     def _lateral_gap(self) -> float:
-        """Return the lateral distance from the own center to that of the other entity, positive to the left [m]."""
+        """Return the lateral distance to the other entity, positive to the left [m].
+
+        It is that of the reference points, or of the centers of the boxes for free space.
+        """
         frame = resolve_coordinate_system(self.action.coordinate_system)
         me, other = self.actor.name, self.action.entity_ref
         here, roads = self.actor.motion.location, self.context.roads
@@ -117,11 +120,13 @@ class LateralDistanceAction(ActionBehaviour):
             beside = distance(self.context, me, other, frame=frame, kind="lateral", freespace=False)
             if frame == "world" and math.cos(self.context.pose(me).h) < 0.0:
                 beside = -beside
+        if not self.action.freespace:
+            return beside
         my_box, their_box = self._boxes()
-        return beside + their_box.center.y - my_box.center.y
+        return beside + their_box.center.y * same_way(self.context, me, other, frame) - my_box.center.y
 
     def _wanted_gap(self) -> float:
-        """Return the wanted distance between both centers [m]."""
+        """Return the wanted distance between both reference points, or both centers for free space [m]."""
         apart = self.action.distance or 0.0
         if self.action.freespace:
             apart += 0.5 * sum(box.dimensions.width for box in self._boxes())
