@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -15,7 +16,9 @@ from street_scene import NOTHING, after
 from trajectories import curve, follow, on_road, world
 from whole_run import RecordedRun, Run
 
-from eidrive_scenario.simulation import RunSettings
+from eidrive_scenario.recording.frame import Frame
+from eidrive_scenario.simulation import RunSettings, Simulation
+from eidrive_scenario.storyboard.positions.distances import distance
 
 HALF_TURN = math.pi
 
@@ -205,6 +208,25 @@ def test_distance_on_self_crossing_trajectory_refers_to_the_current_pass(scene: 
     times = [c.time for c in played.changes if c.element == "event 1" and c.after.value == "runningState"]
     lengths = [100.0, 160.0 + 60.0 + 60.0 + 60.0]
     assert times == pytest.approx([length / 20.0 for length in lengths], abs=0.15)
+
+
+@pytest.mark.parametrize(("heading", "front"), [(0.0, 4.0), (math.pi, 1.0)])
+def test_free_space_along_a_trajectory_of_a_reversing_actor(run: Run, heading: float, front: float) -> None:
+    """After the steps until 0.55 s at 10 m/s the reference points are 44.5 m apart. A box reaches from -1 m to 4 m.
+
+    Ego moves tail first with the heading π, so that its rear is ahead.
+    """
+    spaces: dict[float, tuple[float, float]] = {}
+
+    def look(simulation: Simulation, frame: Frame) -> None:
+        measured = partial(distance, simulation.storyboard.context, "Ego", "Other", frame="trajectory")
+        along = partial(measured, kind="longitudinal")
+        spaces[round(frame.view.time, 2)] = along(freespace=False), along(freespace=True)
+
+    way = curve(*(world(x, -2.0, heading) for x in (100.0, 200.0, 300.0)))
+    init = f'<Private entityRef="Ego">{follow(way)}</Private>'
+    run(1, driven=False, init=init, ego=(-1, 100.0, 10.0), others={"Other": (-1, 150.0, 0.0)}, during=look)
+    assert spaces[0.5] == pytest.approx((44.5, 44.5 - front - 1.0))
 
 
 @pytest.mark.element("TrajectoryPosition")

@@ -61,6 +61,10 @@ def _own_axis(context: ConditionContext, name: str, frame: str) -> float:
         if here is not None:
             lane = context.roads.pose(here).h
             heading = lane if math.cos(lane - heading) >= 0.0 else lane + math.pi
+    progress = context.actors[name].progress if frame == "trajectory" else None
+    if progress is not None:
+        along = progress.layout.tangent(progress.at(context.view.tick))
+        heading = along if progress.way > 0 else along + math.pi
     return heading
 
 
