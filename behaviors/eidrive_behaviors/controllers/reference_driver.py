@@ -87,7 +87,7 @@ class ReferenceDriver(SafetyModel):
         self._track_approaches(seen)
         self._select_lead(seen)
         self._update_phase(ego)
-        lead = self._lead
+        lead = self.lead
         if lead is not None and lead.covers and lead.time_to_collision < self.settings.emergency:
             self._emergency = True
         if self.phase is not DriverPhase.BRAKING and not self._emergency:
@@ -104,13 +104,13 @@ class ReferenceDriver(SafetyModel):
 
     def _select_lead(self, seen: list[LeadObject]) -> None:
         held = self.phase is not DriverPhase.CALM and self.settings.full_stop
-        if held and self._lead is not None:
-            name = self._lead.name
-            self._lead = next((other for other in seen if other.name == name), self._lead)
+        if held and self.lead is not None:
+            name = self.lead.name
+            self.lead = next((other for other in seen if other.name == name), self.lead)
             return
-        before = self._lead.name if self._lead is not None else None
-        self._lead, risk = self._most_urgent(seen)
-        changed = self._lead is not None and (self._lead.name != before or risk is not self.risk)
+        before = self.lead.name if self.lead is not None else None
+        self.lead, risk = self._most_urgent(seen)
+        changed = self.lead is not None and (self.lead.name != before or risk is not self.risk)
         if changed and risk is not Risk.NONE:
             self.risk = risk
 
@@ -149,7 +149,7 @@ class ReferenceDriver(SafetyModel):
         return abs(other.across - self._began[other.name]) > self.settings.moved
 
     def _update_phase(self, ego: EgoKinematics) -> None:
-        lead = self._lead
+        lead = self.lead
         if lead is None or ego.speed <= TINY:
             self.phase, self.risk, self._emergency = DriverPhase.CALM, Risk.NONE, False
         elif self.phase is DriverPhase.CALM:

@@ -42,6 +42,8 @@ class SafetyModel(ABC):
 
     reach: ClassVar[float] = math.inf
     """Range of the search for lead objects [m]; JRC-FSM has no limit."""
+    lead: LeadObject | None = None
+    """Lead object of the last decision."""
 
     @abstractmethod
     def decide(self, ego: EgoKinematics, seen: list[LeadObject]) -> float | None:
@@ -50,13 +52,6 @@ class SafetyModel(ABC):
     @abstractmethod
     def following_distance(self, ego: EgoKinematics, lead: LeadObject) -> float:
         """Return the gap to keep if the situation is not critical [m]."""
-
-    @property
-    def lead(self) -> LeadObject | None:
-        """Lead object of the last decision."""
-        return self._lead
-
-    _lead: LeadObject | None = None
 
 
 class MemorylessModel(SafetyModel):
@@ -74,8 +69,8 @@ class MemorylessModel(SafetyModel):
 
     def decide(self, ego: EgoKinematics, seen: list[LeadObject]) -> float | None:
         """Return the braking acceleration after the reaction time [m/s²]; None if the situation is not critical."""
-        self._lead = next((candidate for candidate in seen if self.matters(ego, candidate)), None)
-        before, lead = self._critical, self._lead
+        self.lead = next((candidate for candidate in seen if self.matters(ego, candidate)), None)
+        before, lead = self._critical, self.lead
         self._critical = lead is not None and lead.closing > 0.0 and lead.gap > 0.0 and self.critical(ego, lead)
         self._critical = self._critical or (before and self.full_stop and ego.speed > 0.0)
         if not self._critical:

@@ -166,7 +166,7 @@ class Actor:
         elif self.standing_since is None:
             self.standing_since = view.time
         if self.driven:
-            motion.set_observed_state(pose_of(view, row), speed)
+            motion.set_observed_state(Pose(*state[:6]), speed)
         elif end_of_road or self.end_of_road_since is not None:
             self._set_at_end_of_road(end_of_road, view.time)
         return True
@@ -229,11 +229,6 @@ class Actor:
     def invalidate_location(self) -> None:
         """Discard the lane location of this tick after a teleport."""
         self._location_tick = -2
-
-
-def pose_of(view: WorldView, row: int) -> Pose:
-    """Return the pose of one row of a view."""
-    return Pose(*view.states[row][:6])
 
 
 def _on_road(roads: RoadNetwork, here: LaneLocation) -> bool:
