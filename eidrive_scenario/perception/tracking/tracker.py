@@ -221,6 +221,8 @@ class Tracker(TrackingMethod):
     ) -> dict[int, int]:
         """Return which of the boxes in `columns` overlap with the body of a confirmed track, with its row.
 
+        The body is one with a detected box, or else that in whose middle the box is most. So are the boxes in order.
+
         apart  (N, M) whether track and box are on two levels
 
         Two bodies cannot overlap, so that they show this object: a part of it, or all of it outside the gate. A body
@@ -234,12 +236,19 @@ class Tracker(TrackingMethod):
         axes = _axes(bodies[:, 6])
         spread = expected.covariance[tracks, None, :2, :2] + noise[columns]
         deviation = np.sqrt(np.einsum("tai,tbij,taj->tba", axes, spread, axes))
-        deviation[np.isin(tracks, detected)] = 0.0
-        reach = bodies[:, None, 3:5] / 2.0 + SIGNIFICANT * deviation
-        on_body = np.all(np.abs(np.einsum("tai,tbi->tba", axes, offset)) < reach, axis=-1)
+        is_detected = np.isin(tracks, detected)
+        deviation[is_detected] = 0.0
+        half = bodies[:, None, 3:5] / 2.0
+        offset = np.abs(np.einsum("tai,tbi->tba", axes, offset))
+        on_body = np.all(offset < half + SIGNIFICANT * deviation, axis=-1)
         on_body |= iou_bev(bodies, boxes[columns]) > LARGEST_OVERLAP
         on_body &= ~apart[np.ix_(tracks, columns)]
-        return {int(columns[column]): int(tracks[row]) for row, column in np.argwhere(on_body).tolist()}
+        bodies_on, boxes_on = np.nonzero(on_body)
+        order = np.lexsort([(offset / half).max(axis=-1)[on_body], ~is_detected[bodies_on]])
+        row_of: dict[int, int] = {}
+        for row, column in zip(tracks[bodies_on[order]].tolist(), columns[boxes_on[order]].tolist(), strict=True):
+            row_of.setdefault(column, row)
+        return row_of
 
     def _update_existence(
         self,

@@ -416,6 +416,30 @@ def test_box_beside_an_undetected_body_is_this_object() -> None:
         assert track.update(replace(part, time=DT * scan)).tracks == (1,)
 
 
+@pytest.mark.parametrize("places", [((0.0, 0.0), (5.5, 0.0)), ((5.5, 0.0), (0.0, 0.0))])
+def test_box_on_a_detected_body_moves_no_hidden_neighbor(places: tuple[tuple[float, float], ...]) -> None:
+    """A second box is around the front of a detected car; 5.5 m ahead is one that is not detected. It stays there."""
+    track = tracker()
+    for scan in range(2):
+        track.update(cars(DT * scan, *places, deviation=0.5))
+    track.update(cars(0.2, (0.0, 0.0), deviation=0.5), in_view=lambda boxes: np.zeros(len(boxes)))
+    both = cars(0.3, (0.0, 0.0), (1.9, 0.0), deviation=0.5)
+    both.boxes[1, 3:5] = 0.6, 1.6
+    held = track.update(both, in_view=lambda boxes: np.zeros(len(boxes)))
+    assert sorted(held.boxes[:, 0].tolist()) == pytest.approx([0.0, 5.5], abs=1e-9)
+
+
+@pytest.mark.parametrize("order", [[0, 1], [1, 0]])
+def test_better_of_two_boxes_on_an_undetected_body_updates_it(order: list[int]) -> None:
+    """One box is 1.9 m ahead of the center of the car, one 1.2 m behind it: the car is corrected backwards."""
+    track = tracker()
+    for scan in range(6):
+        track.update(cars(DT * scan, (0.0, 0.0)))
+    held = track.update(cars(0.6, *[((1.9, 0.0), (-1.2, 0.0))[box] for box in order]))
+    assert held.tracks == (1,)
+    assert held.boxes[0, 0] < 0.0
+
+
 def test_velocity_of_new_track_is_zero_until_it_is_known() -> None:
     """Errors of 0.4 m let a parked car seem to move by 0.8 m in 0.1 s: 8 m/s with a standard deviation of 5.7 m/s. A
     car at 15 m/s with errors of 0.1 m moves for certain from its third box on."""
