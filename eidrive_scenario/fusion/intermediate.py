@@ -225,7 +225,7 @@ class IntermediateFusion(CovarianceIntersectionFusion):
         """Return the moving boxes of a station after a report, by object."""
         detections = report.detections
         held = {} if report.complete else self._boxes.get(report.station, {})
-        now, max_age = detections.time, self.settings.max_age
+        now, max_age = detections.time, self.settings.max_age + TIME_TOLERANCE
         boxes = {number: box for number, box in held.items() if abs(now - box.time) <= max_age}
         numbers = detections.tracks or range(len(detections))
         for number, box, (vx, vy) in zip(numbers, detections.boxes.tolist(), detections.velocity.tolist(), strict=True):
@@ -266,7 +266,7 @@ class IntermediateFusion(CovarianceIntersectionFusion):
                 (x + vx * (held.time - time), y + vy * (held.time - time), yaw, length + 2.0 * BOX_MARGIN,
                  width + 2.0 * BOX_MARGIN, vx, vy)
                 for time, x, y, yaw, length, width, vx, vy in self._boxes.get(sender, {}).values()
-                if abs(held.time - time) <= self.settings.max_age
+                if abs(held.time - time) <= self.settings.max_age + TIME_TOLERANCE
             ]).reshape(-1, 7)  # fmt: skip
             grid, age = self._grid_for(self._reports.get(sender), held, readings), features.time - held.time
             latent, present[station] = warp(held.latent, held.present, held.grid, grid, moving, age)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.base.detections import CLASSES, NOT_ESTIMATED
+from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.fusion.pairs import AssociationGate, Table, assigned_pairs, gated_pairs, ranges
 from eidrive_scenario.fusion.prediction import (
@@ -206,7 +207,7 @@ def update_tracks(
     if not len(tracks):
         return born
     times = np.array([report.detections.time for report in reports])[tracks["station"]]
-    recent = times - tracks["seen"] <= max_age
+    recent = times - tracks["seen"] <= max_age + TIME_TOLERANCE
     if not recent.all():
         tracks, times = tracks.take(np.flatnonzero(recent)), times[recent]
     predict_tracks(tracks, times)

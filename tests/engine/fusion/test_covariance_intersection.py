@@ -324,6 +324,17 @@ def test_fuse_deletes_tracks_after_the_maximum_age(report: Make, fuse: Fuse) -> 
     assert len(CovarianceIntersectionFusion().fuse([], 1.0)) == 0
 
 
+@pytest.mark.parametrize(("first", "later"), [(2.0, 3.0), (2.3, 33 * 0.1)])
+def test_update_of_a_track_at_the_maximum_age_gives_its_velocity(
+    first: float, later: float, report: Make, fuse: Fuse
+) -> None:
+    """The car moves by 5 m in 1 s, which rounding of the times exceeds in one case."""
+    brief = CovarianceIntersectionFusion(CovarianceIntersectionSettings(max_age=1.0))
+    fuse([report("A", first, [(0.0, 0.0)])], first, brief)
+    fused = fuse([report("A", later, [(5.0, 0.0)])], later, brief)
+    np.testing.assert_allclose(fused.velocity, [[5.0, 0.0]], atol=0.1)
+
+
 def test_fuse_adds_the_pose_covariance_of_the_sender(report: Make, fuse: Fuse) -> None:
     """One degree at 80 m is 1.4 m across; along the ray only the position uncertainty counts."""
     pose = np.diag([0.04, 0.09, math.radians(1.0) ** 2])
