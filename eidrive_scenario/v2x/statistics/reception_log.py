@@ -201,7 +201,7 @@ class ReceptionLog:
         self._process_pending()
         self._left[station] = now
         sent = [senders[station] for senders in self._codes.values() if station in senders]
-        codes = np.array([*self._codes.get(station, {}).values(), *sent], dtype=np.int64)
+        codes = np.unique(np.array([*self._codes.get(station, {}).values(), *sent], dtype=np.int64))
         codes = codes[np.isfinite(self._newest_present[codes])]
         self._ages.end(codes, now - self._newest_present[codes])
         self._newest_present[codes] = -np.inf

@@ -98,3 +98,16 @@ def test_reception_statistics_of_a_link_are_independent_of_other_links() -> None
     alone, among_others = one.statistics_by_link(NOW), complete.statistics_by_link(NOW)
     assert set(alone) == {("A", "B"), ("C", "B")}
     assert all(among_others[link] == receptions for link, receptions in alone.items())
+
+
+@pytest.mark.parametrize("sender", ["A", "B"])
+def test_departure_ends_the_age_of_each_link_once(sender: str) -> None:
+    """The age is 0.1 s at 0.1 s, grows to 1.1 s, is 0.1 s again, and grows to 5 s at the departure at 6 s."""
+    log = ReceptionLog()
+    for number in range(2):
+        sent = float(number)
+        message = Message(sender, number, sent, StationState(sent, 0, 0, 0, 0, 0), Detections(sent), 100)
+        log.record("A", [(sent + 0.1, sender, number, sent, ReceivedMessage(message, sent + 0.1))])
+    log.end_links("A", 6.0)
+    mean_age = (1.1**2 - 0.1**2 + 5.0**2 - 0.1**2) / 2.0 / (6.0 - 0.1)
+    assert log.statistics_by_link(7.0)[sender, "A"].mean_age == pytest.approx(mean_age)
