@@ -161,7 +161,8 @@ def cam_value(message: Message, low_frequency: bool) -> dict[str, Any]:
 def cpm_value(message: Message, station: str) -> dict[str, Any]:
     """Return a CPM (TR 103 562, annex A) of a station of this class.
 
-    Objects are in the frame of the sender. A CPM of a roadside unit omits the container of the originating station.
+    Objects are in the frame of the sender, whose axes are east and north if it is a roadside unit, with velocities
+    relative to it. A CPM of a roadside unit omits the container of the originating station.
     """
     state, detections = message.state, message.detections
     parameters: dict[str, Any] = {
@@ -177,7 +178,8 @@ def cpm_value(message: Message, station: str) -> dict[str, Any]:
     if len(detections):
         delay = _clamp((state.time - detections.time) * 1e3, -1500, 1500)
         parameters["perceivedObjectContainer"] = [
-            _object(message, row, delay) for row in range(min(len(detections), 128))
+            _object(message, row, delay, 0.0 if station == ROADSIDE else state.yaw)
+            for row in range(min(len(detections), 128))
         ]
     return {
         "header": _header(14, message.sender),
@@ -185,12 +187,14 @@ def cpm_value(message: Message, station: str) -> dict[str, Any]:
     }
 
 
-def _object(message: Message, row: int, delay: int) -> dict[str, Any]:
+def _object(message: Message, row: int, delay: int, axis: float) -> dict[str, Any]:
+    """Return an object in a frame whose x axis has the direction `axis` [rad]."""
     state, detections = message.state, message.detections
     x, y, z, length, width, height, yaw = detections.boxes[row].tolist()
-    cos, sin = math.cos(state.yaw), math.sin(state.yaw)
+    cos, sin = math.cos(axis), math.sin(axis)
     east, north = x - state.x, y - state.y
     vx, vy = detections.velocity[row].tolist()
+    vx, vy = vx - state.speed * math.cos(state.yaw), vy - state.speed * math.sin(state.yaw)
     speeds = [16383, 16383]
     if not math.isnan(vx + vy):
         speeds = [_clamp(100.0 * v, -16382, 16382) for v in (cos * vx + sin * vy, cos * vy - sin * vx)]
@@ -210,9 +214,10 @@ def _object(message: Message, row: int, delay: int) -> dict[str, Any]:
         "zDistance": _distance(z - state.z),
         "xSpeed": {"value": speeds[0], "confidence": 127},
         "ySpeed": {"value": speeds[1], "confidence": 127},
-        "yawAngle": {"value": _tenths_of_degrees(yaw - state.yaw), "confidence": 127},
-        "planarObjectDimension1": {"value": _clamp(10.0 * length, 0, 1023), "confidence": 102},
-        "planarObjectDimension2": {"value": _clamp(10.0 * width, 0, 1023), "confidence": 102},
+        "yawAngle": {"value": _tenths_of_degrees(yaw - axis), "confidence": 127},
+        # The first dimension is across the direction of the yaw angle.
+        "planarObjectDimension1": {"value": _clamp(10.0 * width, 0, 1023), "confidence": 102},
+        "planarObjectDimension2": {"value": _clamp(10.0 * length, 0, 1023), "confidence": 102},
         "verticalObjectDimension": {"value": _clamp(10.0 * height, 0, 1023), "confidence": 102},
         "objectRefPoint": 0,
         "classification": [{"confidence": 101, "class": kind}],

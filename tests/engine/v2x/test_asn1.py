@@ -28,7 +28,8 @@ def message(kind: str, count: int, x: float = 10.0) -> Message:
 
 
 def test_encoder_writes_cpm_objects_in_the_frame_of_the_sender() -> None:
-    """With heading along y, an object 15 m further along y is 15 m ahead and moves ahead at 3 m/s."""
+    """With heading along y, an object 15 m further along y is 15 m ahead. Its 3 m/s are 5 m/s less than those of the
+    sender."""
     encoder = Asn1Encoder([TINY], ["cpm"])
     decoded = encoder.decode("cpm", encoder.encode(message("cpm", 2)))
     assert decoded["header"]["messageID"] == 14
@@ -39,7 +40,27 @@ def test_encoder_writes_cpm_objects_in_the_frame_of_the_sender() -> None:
     assert first["timeOfMeasurement"] == 100
     assert (first["xDistance"]["value"], first["yDistance"]["value"]) == (1500, 0)
     assert (second["xDistance"]["value"], second["yDistance"]["value"]) == (1500, -500)
-    assert first["xSpeed"]["value"] == 300
+    assert first["xSpeed"]["value"] == -500
+
+
+@pytest.mark.parametrize(
+    ("station", "distance", "speed", "yaw"),
+    [("car", (1500, -500), (-500, 0), 2700), ("misc", (500, 1500), (0, 300), 0)],
+)
+def test_cpm_objects_have_the_axes_of_their_station(
+    station: str, distance: tuple[int, int], speed: tuple[int, int], yaw: int
+) -> None:
+    """TR 103 562, annex A: the axes are those of the vehicle, or east and north for a roadside unit. Speeds are
+    relative to the station, which drives north at 8 m/s or is at rest. The first dimension of an object is across its
+    yaw angle. It is 5 m east and 15 m north, directed east, and moves north at 3 m/s."""
+    seen = message("cpm", 2)
+    if station == "misc":
+        seen = replace(seen, state=replace(seen.state, speed=0.0))
+    second = cpm_value(seen, station)["cpm"]["cpmParameters"]["perceivedObjectContainer"][1]
+    assert tuple(second[axis + "Distance"]["value"] for axis in "xy") == distance
+    assert tuple(second[axis + "Speed"]["value"] for axis in "xy") == speed
+    assert second["yawAngle"]["value"] == yaw
+    assert [second[f"planarObjectDimension{number}"]["value"] for number in (1, 2)] == [18, 45]
 
 
 def test_modules_with_byte_order_mark_are_those_without(tmp_path: Path) -> None:
