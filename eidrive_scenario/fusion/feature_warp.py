@@ -130,14 +130,11 @@ def _warp(latent: Floats, present: Bools, transform: Array, boxes: Array, warped
 @kernel("void(f4[:,::1], b1[:,::1], f4[:,:,::1])")
 def scatter(features: Floats, present: Bools, grid: Floats) -> None:
     """Write features (C, N) of the N present cells (n, m), in their order, into a grid (C, n, m)."""
-    rows, columns = present.shape
+    cells = np.flatnonzero(present)
+    flat = grid.reshape(len(grid), -1)
     for channel in range(len(features)):
-        cell = 0
-        for i in range(rows):
-            for j in range(columns):
-                if present[i, j]:
-                    grid[channel, i, j] = features[channel, cell]
-                    cell += 1
+        for number, cell in enumerate(cells):
+            flat[channel, cell] = features[channel, number]
 
 
 def attend(own: Floats, received: Floats, present: Bools) -> Floats:
