@@ -11,7 +11,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.base.geometry import wrap_angle
+from eidrive_scenario.base.geometry import rotation, wrap_angle
 
 NOT_ESTIMATED: Array = np.empty(0)
 """Existence, and variance of the velocity, of objects for which no tracker and no fusion method has estimated it."""
@@ -118,13 +118,12 @@ class Detections(msgspec.Struct, frozen=True, gc=False):
         before, after  (2,) positions of the station of these detections, and of the returned ones [m]
         turn           change of its heading [rad]
         """
-        cos, sin = math.cos(turn), math.sin(turn)
-        rotation = np.array([[cos, -sin], [sin, cos]])
+        turned = rotation(turn)
         boxes = self.boxes.copy()
-        boxes[:, :2] = (boxes[:, :2] - before) @ rotation.T + after
+        boxes[:, :2] = (boxes[:, :2] - before) @ turned.T + after
         boxes[:, 6] = wrap_angle(boxes[:, 6] + turn)
         return replace(
-            self, boxes=boxes, velocity=self.velocity @ rotation.T, covariance=rotation @ self.covariance @ rotation.T
+            self, boxes=boxes, velocity=self.velocity @ turned.T, covariance=turned @ self.covariance @ turned.T
         )
 
     def subset(self, rows: Sequence[int]) -> Detections:

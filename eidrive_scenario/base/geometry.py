@@ -43,6 +43,12 @@ def components(x: float, y: float, heading: float) -> tuple[float, float]:
     return cos * x + sin * y, cos * y - sin * x
 
 
+def rotation(angle: float) -> Array:
+    """Return the rotation (2, 2) in the plane by an angle [rad], from axes with this heading to those of the world."""
+    cos, sin = math.cos(angle), math.sin(angle)
+    return np.array([[cos, -sin], [sin, cos]])
+
+
 def rotation_matrix(yaw: Any, pitch: Any = 0.0, roll: Any = 0.0) -> Array:
     """Return rotations (..., 3, 3) from the body frame to the world frame: yaw, then pitch, then roll (z-y'-x'')."""
     yaw, pitch, roll = np.broadcast_arrays(yaw, pitch, roll)

@@ -9,6 +9,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array, Bools, Floats, Integers
 from eidrive_scenario.base.feature_map import FeatureMap
+from eidrive_scenario.base.geometry import rotation
 from eidrive_scenario.base.kernels import kernel
 
 ENOUGH = 0.5
@@ -34,14 +35,12 @@ class Grid:
     def to_world(self, coordinates: Array | Integers) -> Array:
         """Return the points (..., 2) in the world of coordinates in cells, where integers are centers of cells."""
         local = (coordinates + 0.5 - np.array(self.shape) / 2.0) * self.cell
-        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
-        world: Array = local @ np.array([[cos, sin], [-sin, cos]]) + (self.x, self.y)
+        world: Array = local @ rotation(-self.yaw) + (self.x, self.y)
         return world
 
     def to_coordinates(self, points: Array) -> Array:
         """Return the coordinates (..., 2) in cells of points in the world."""
-        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
-        local = (points - (self.x, self.y)) @ np.array([[cos, -sin], [sin, cos]])
+        local = (points - (self.x, self.y)) @ rotation(self.yaw)
         return np.asarray(local / self.cell + np.array(self.shape) / 2.0 - 0.5)
 
     def cells(self, points: Array) -> tuple[Integers, Bools]:

@@ -28,7 +28,7 @@ from msgspec.structs import replace
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.base.assignment import assign
 from eidrive_scenario.base.detections import CLASSES, VULNERABLE, Detections
-from eidrive_scenario.base.geometry import on_two_levels, wrap_angle
+from eidrive_scenario.base.geometry import on_two_levels, rotation, wrap_angle
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.fusion.method import Report
 from eidrive_scenario.fusion.pairs import AssociationGate, Table
@@ -425,8 +425,7 @@ def _log_odds(offset: Array, covariance: Array) -> Array:
 def _moved(candidates: _Candidates, pairs: Integers, error: Array) -> tuple[Array, Array]:
     """Return the offsets (K, 2) of pairs after the correction of an error (3,), and their derivatives (K, 2, 3)."""
     lever = candidates.lever[pairs]
-    cos, sin = math.cos(error[2]), math.sin(error[2])
-    turned = lever @ np.array([[cos, -sin], [sin, cos]])
+    turned = lever @ rotation(error[2])
     return candidates.offset[pairs] + turned - lever - error[:2], pose_jacobian(turned, 0.0, 0.0)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.base.detections import CLASSES, Detections
-from eidrive_scenario.base.geometry import footprint
+from eidrive_scenario.base.geometry import footprint, rotation
 from eidrive_scenario.driving.planning.path import PathPart
 from eidrive_scenario.driving.step import StationPerception
 from eidrive_scenario.gym.libraries import spaces
@@ -127,7 +127,7 @@ def occupancy_grid(objects: Detections, route: Array, ego: EgoState, settings: G
     route  points (P, 2) in the frame of the vehicle [m]
     """
     grid = np.zeros((len(CHANNELS), settings.length, settings.width), np.float32)
-    axes = _axes(ego)
+    axes = rotation(ego.yaw)
     corners_of_all = footprint(objects.boxes)
     for row in reversed(nearest_rows(objects, ego)):
         corners = (corners_of_all[row] - ego.position[:2]) @ axes
@@ -276,14 +276,8 @@ class ObservationEncoder:
     def _grid(self, settings: GridSettings, perceived: StationPerception) -> NDArray[Any]:
         ego = perceived.ego
         route = self._route
-        points = np.empty((0, 2)) if route is None else (route.points - ego.position[:2]) @ _axes(ego)
+        points = np.empty((0, 2)) if route is None else (route.points - ego.position[:2]) @ rotation(ego.yaw)
         return occupancy_grid(perceived.fused, points, ego, settings).ravel()
-
-
-def _axes(ego: EgoState) -> Array:
-    """Return the axes of the vehicle as columns (2, 2) in the world frame."""
-    cos, sin = math.cos(ego.yaw), math.sin(ego.yaw)
-    return np.array([[cos, -sin], [sin, cos]])
 
 
 def points_ahead(route: PathPart, ego: EgoState, settings: RouteSettings) -> list[float]:

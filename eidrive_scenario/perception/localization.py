@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from pydantic import Field
 
 from eidrive_scenario.base.arrays import Array
-from eidrive_scenario.base.geometry import is_teleport, wrap_angle
+from eidrive_scenario.base.geometry import is_teleport, rotation, wrap_angle
 from eidrive_scenario.base.randomness import generator
 from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.sensing.readings import EgoState, GnssReading, ImuReading, Readings
@@ -203,9 +203,8 @@ def at_pose(readings: Readings, ego: EgoState) -> Readings:
     """Return the readings as if the station were at this pose."""
     truth = readings.ego
     turn = ego.yaw - truth.yaw
-    cos, sin = math.cos(turn), math.sin(turn)
     rigid = np.eye(4)
-    rigid[:2, :2] = [[cos, -sin], [sin, cos]]
+    rigid[:2, :2] = rotation(turn)
     rigid[:2, 3] = ego.position[:2] - rigid[:2, :2] @ truth.position[:2]
     truth_reading = readings.truth
     if truth_reading is not None:

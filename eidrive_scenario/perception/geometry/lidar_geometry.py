@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eidrive_scenario.base.arrays import Array
+from eidrive_scenario.base.geometry import rotation
 from eidrive_scenario.sensing.readings import LidarReading
 from eidrive_scenario.sensing.settings import LidarSettings
 
@@ -70,14 +71,12 @@ class LevelFrame:
 
     def covariance_to_local(self, covariance: Array) -> Array:
         """Return covariances (N, 2, 2) in the plane, rotated to the axes of this frame."""
-        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
-        turn = np.array([[cos, sin], [-sin, cos]])
+        turn = rotation(-self.yaw)
         return np.asarray(turn @ covariance @ turn.T)
 
     def covariance_to_world(self, covariance: Array) -> Array:
         """Return covariances (N, 2, 2) in the plane, rotated to the axes of the world."""
-        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
-        turn = np.array([[cos, -sin], [sin, cos]])
+        turn = rotation(self.yaw)
         return np.asarray(turn @ covariance @ turn.T)
 
 

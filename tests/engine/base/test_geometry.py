@@ -20,6 +20,7 @@ from eidrive_scenario.base.geometry import (
     point_in_polygon,
     points_in_box,
     points_in_polygon,
+    rotation,
     rotation_matrix,
     wrap_angle,
 )
@@ -34,6 +35,11 @@ UNIT = (0.0, 0.0, 0.5, 2.0, 1.0, 1.0, 0.0)
 def test_wrap_angle(angle: float, expected: float) -> None:
     assert wrap_angle(angle) == pytest.approx(expected)
     assert wrap_angle(np.array([angle]))[0] == pytest.approx(expected)
+
+
+def test_rotation_in_the_plane_is_that_of_a_yaw() -> None:
+    assert rotation(0.3).tolist() == rotation_matrix(0.3)[:2, :2].tolist()
+    assert rotation(math.pi / 2.0) @ (1.0, 0.0) == pytest.approx((0.0, 1.0))
 
 
 def test_rotation_order_is_yaw_pitch_roll() -> None:

@@ -13,6 +13,7 @@ from pydantic import Field
 from eidrive_scenario.base.arrays import Array, Floats
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.feature_map import FeatureMap
+from eidrive_scenario.base.geometry import rotation
 from eidrive_scenario.extensions.settings import Settings
 from eidrive_scenario.perception.detector import Detector, DetectorContext, without_duplicates
 from eidrive_scenario.perception.geometry.lidar_geometry import LevelFrame, pattern_from_settings
@@ -170,8 +171,7 @@ class PillarDetector(Detector):
         objects = decode(maps, features.cell, self.settings.confidence or network.confidence)
         boxes = LevelFrame(features.x, features.y, features.height, features.yaw).boxes_to_world(objects.boxes)
         boxes[:, 2] += self._map_context.ground(boxes[:, :2], features.foot)
-        cos, sin = math.cos(features.yaw), math.sin(features.yaw)
-        velocity = objects.displacement @ np.array([[cos, sin], [-sin, cos]]) / (features.interval or math.nan)
+        velocity = objects.displacement @ rotation(-features.yaw) / (features.interval or math.nan)
         return without_duplicates(
             Detections(
                 time,
