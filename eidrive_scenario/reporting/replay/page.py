@@ -163,7 +163,7 @@ def decisive_instant(data: Data, result: ReportedRun | None, names: Collection[s
     names  names of the actors
     """
     if result is not None and data["contact"] is None:
-        approach = closest_approach(result.metrics, [verdict.value for verdict in result.criteria], names)
+        approach = closest_approach(result.metrics, result.criteria, names)
         if approach is not None:
             return approach
     decisive: dict[str, Any] | None = data["decisive"]

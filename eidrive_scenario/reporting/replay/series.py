@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.evaluation.nearest_actor import min_time_to_collision, nearest_body, nearest_pair
 from eidrive_scenario.recording.frame import Frame
 
@@ -134,26 +135,28 @@ class SeriesBuilder:
 
 
 def closest_approach(
-    metrics: Mapping[str, float | None], values: Sequence[float | None], names: Collection[str] = ()
+    metrics: Mapping[str, float | None], verdicts: Sequence[Verdict], names: Collection[str] = ()
 ) -> Values | None:
     """Return the instant of the smallest distance that a criterion `min_distance` measured, or None.
 
-    names   names of the actors, which may contain dots
-    values  those of the verdicts of the run: a criterion measures either the distance of the centers or that of the
-            bodies, and the time among its metrics is that of the measured one
+    names     names of the actors, which may contain dots
+    verdicts  those of the run: a criterion measures either the distance of the centers or that of the bodies, and the
+              time among its metrics is that of the measured one
     """
+    numbers = {name: value for name, value in metrics.items() if value is not None and math.isfinite(value)}
     approaches = []
-    for name, time in metrics.items():
-        if name.startswith("min_distance.") and name.endswith(".time") and time is not None and math.isfinite(time):
+    for name, time in numbers.items():
+        if name.startswith("min_distance.") and name.endswith(".time"):
             pair = name.removeprefix("min_distance.").removesuffix(".time")
-            center, box = (metrics.get(f"min_distance.{pair}.{measure}") for measure in ("center", "box"))
+            center, box = (numbers.get(f"min_distance.{pair}.{measure}") for measure in ("center", "box"))
             # Of two criteria for one pair, the last one counts, whose time may begin with its own name
-            both = [value for value in values if value is not None and value in (center, box)]
-            measured = both[-1] if both else center
-            times = [value for other, value in metrics.items() if other.endswith(f".{pair}.time") and value is not None]
-            if measured is not None and math.isfinite(measured):
+            both = [verdict for verdict in verdicts if verdict.value is not None and verdict.value in (center, box)]
+            measured, when = center, time
+            if both:
+                measured, when = both[-1].value, numbers.get(f"{both[-1].name}.{pair}.time", time)
+            if measured is not None:
                 ends = "centers" if measured == center else "bodies"
-                approaches.append((measured, times[-1], _pair_text(pair, names), ends))
+                approaches.append((measured, when, _pair_text(pair, names), ends))
     if not approaches:
         return None
     distance, time, pair, ends = min(approaches)

@@ -16,6 +16,7 @@ from written_recording import detected, step, view
 from eidrive_scenario.base.coverage import ViewSector
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.base.geometry import box_distance
+from eidrive_scenario.evaluation.criterion import Verdict
 from eidrive_scenario.evaluation.nearest_actor import nearest_body, nearest_pair
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.integrity import DamageReport
@@ -196,6 +197,13 @@ def test_trailer_of_a_vehicle_is_not_decisive(street: Play) -> None:
     assert "0.00 m" not in decisive["text"]
 
 
+def distance_verdicts(*values: float | None) -> list[Verdict]:
+    """Return verdicts of criteria `min_distance` with these values, named as those of one run."""
+    return [
+        Verdict("min_distance" if n == 1 else f"min_distance_{n}", True, value) for n, value in enumerate(values, 1)
+    ]
+
+
 def test_closest_approach_is_the_distance_that_a_criterion_measured() -> None:
     """The bus comes nearer by its center, the car by its body, which is what its criterion measures."""
     metrics = {
@@ -209,20 +217,28 @@ def test_closest_approach_is_the_distance_that_a_criterion_measured() -> None:
         "min_distance.Ego.Lost.time": 1.0,
     }
     bus = {"time": 7.0, "text": "closest approach of Ego and Bus: 2.50 m between centers"}
-    assert closest_approach(metrics, [4.5, 2.5]) == closest_approach(metrics, []) == bus
+    assert (
+        closest_approach(metrics, distance_verdicts(4.5, 2.5)) == closest_approach(metrics, distance_verdicts()) == bus
+    )
     car = {"time": 3.0, "text": "closest approach of Ego and Car: 0.40 m between bodies"}
-    assert closest_approach(metrics, [None, 0.4, 1.0]) == closest_approach(metrics, [4.5, 0.4]) == car
-    second = closest_approach({**metrics, "min_distance_2.Ego.Car.time": 5.0}, [4.5, 0.4])
+    assert (
+        closest_approach(metrics, distance_verdicts(None, 0.4, 1.0))
+        == closest_approach(metrics, distance_verdicts(4.5, 0.4))
+        == car
+    )
+    second = closest_approach({**metrics, "min_distance_2.Ego.Car.time": 5.0}, distance_verdicts(4.5, 0.4))
     assert second == {"time": 5.0, "text": "closest approach of Ego and Car: 0.40 m between bodies"}
-    assert closest_approach({"collision.count": 1.0}, []) is None
+    metrics["first_detection.Ego.Car.time"] = 1.5
+    assert closest_approach(metrics, [*distance_verdicts(4.5, 0.4), Verdict("first_detection", True, 1.5)]) == car
+    assert closest_approach({"collision.count": 1.0}, distance_verdicts()) is None
 
 
 def test_closest_approach_names_actors_with_dots() -> None:
     metrics = {"min_distance.Ego.v2.Car.1.center": 4.5, "min_distance.Ego.v2.Car.1.time": 3.0}
-    found = closest_approach(metrics, [4.5], ["Car.1", "Ego.v2"])
+    found = closest_approach(metrics, distance_verdicts(4.5), ["Car.1", "Ego.v2"])
     assert found is not None
     assert found["text"] == "closest approach of Ego.v2 and Car.1: 4.50 m between centers"
-    unknown = closest_approach(metrics, [4.5])
+    unknown = closest_approach(metrics, distance_verdicts(4.5))
     assert unknown is not None
     assert unknown["text"] == "closest approach of Ego.v2.Car.1: 4.50 m between centers"
 
