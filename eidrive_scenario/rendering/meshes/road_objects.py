@@ -34,13 +34,13 @@ def road_object_mesh(
         case "vegetation":
             small = ball((0.2 * length, -0.15 * width, 0.35 * height), (0.3 * length, 0.3 * width, 0.4 * height), 4, 6)
             mesh.add("leaves", ball((0, 0, 0.45 * height), (length / 2, width / 2, 0.55 * height), 4, 7), small)
-        case "pole" | "post":
+        case "pole" | "post" if radius:
             mesh.add("steel", cylinder((0, 0, 0), (0, 0, height), radius, 0.8 * radius, sides=8))
-        case "lamp":
+        case "lamp" if radius:
             mesh.add("steel", cylinder((0, 0, 0), (0, 0, height), radius, 0.6 * radius, sides=8))
             mesh.add("steel", cylinder((0, 0, height - 0.1), (1.4, 0, height), 0.6 * radius, 0.5 * radius, sides=6))
             mesh.add("plastic", box((1.6, 0, height), (0.6, 0.25, 0.1)))
-        case "guide post":
+        case "guide post" if radius:
             size, top = (2 * radius, 2 * radius, height), (1.6 * radius, 1.6 * radius)
             mesh.add("white", tapered_box((0, 0, height / 2), size, top))
             mesh.add("trim", box((0, 0, 0.8 * height), (2.1 * radius, 2.1 * radius, 0.15 * height)))
@@ -58,7 +58,7 @@ def road_object_mesh(
             mesh.add("orange", cylinder((0, 0, 0.04), (0, 0, height), 0.38 * min(length, width), 0.03, sides=10))
         case "obstacle" if radius:
             mesh.add("gray", cylinder((0, 0, 0), (0, 0, height), radius, sides=12))
-        case "obstacle":
+        case "obstacle" | "pole" | "lamp" | "guide post":
             material = "steel" if "post" in words or "pole" in words else "cargo"
             mesh.add(material, box((0, 0, height / 2), (length, width, height)))
         case "gantry":

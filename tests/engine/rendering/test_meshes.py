@@ -9,7 +9,7 @@ import pytest
 
 from eidrive_scenario.rendering.materials import MATERIALS, PAINTS, paint
 from eidrive_scenario.rendering.meshes import BUILDERS, actor_mesh, solids
-from eidrive_scenario.rendering.meshes.road_objects import building
+from eidrive_scenario.rendering.meshes.road_objects import building, road_object_mesh
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.specs import SHAPES
 
@@ -57,6 +57,13 @@ def spec_of(shape: str) -> ActorSpec:
 )
 def test_solids_are_closed_with_outward_faces(solid: Callable[[], np.ndarray], expected: float) -> None:
     assert volume(solid()) == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize("kind", ["pole", "lamp", "guide post"])
+def test_road_object_without_radius_is_drawn_as_its_box(kind: str) -> None:
+    """As the part of a row of poles without gaps, which is a box of 5 m, 0.3 m and 4 m."""
+    (skin,) = road_object_mesh(kind, "", 5.0, 0.3, 4.0, 0.0).values()
+    assert volume(skin) == pytest.approx(6.0, rel=1e-6)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
