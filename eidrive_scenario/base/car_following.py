@@ -59,7 +59,7 @@ class Drivers:
         return Drivers(self.table[rows])
 
     def response(self, speed: Array, desired_speed: Array, gap: Array, approach: Array) -> Array:
-        """Return `IntelligentDriver.response` with the parameters of each driver."""
+        """Return the accelerations (N,) behind the leaders [m/s²], limited by the brakes."""
         acceleration = self.free(speed, desired_speed) - self.interaction(speed, gap, approach)
         return np.asarray(np.maximum(acceleration, -self.table[:, 5]))
 
