@@ -2,23 +2,23 @@
 
 python -m eidrive_reports.closed_loop --out reports
 
-The output is closed_loop.jsonl, with one line per run, written after each seed, and the table closed_loop.md. Runs of
-an existing closed_loop.jsonl are not repeated.
+The output is closed_loop.jsonl, with one line per run, and the table closed_loop.md. Runs of an existing
+closed_loop.jsonl are not repeated.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
 
 from rich.console import Console
 
 from eidrive_reports.paper import EGO, HIDDEN, SCENARIOS
+from eidrive_reports.run_record import RunRecord
 from eidrive_reports.studies import command, group_by, markdown_table, publish, study_options
 from eidrive_scenario.api.experiments import Job, resolve_scenario, run_jobs, wilson
 from eidrive_scenario.api.run import RunSettings, run_file
@@ -40,6 +40,14 @@ class ClosedLoopRun:
     false_tracks: float
     brakings: int
     without_cause: int
+
+
+class ClosedLoopRecord(RunRecord[ClosedLoopRun]):
+    """Record of the runs."""
+
+    kind = ClosedLoopRun
+    key = attrgetter("scenario", "detector", "channel", "seed")
+    hint = "remove the line"
 
 
 def jobs(detectors: Sequence[str], channels: Sequence[str], seed: int) -> list[Job]:
@@ -92,19 +100,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--detectors", default=",".join(DETECTORS))
     parser.add_argument("--channels", default=",".join(CHANNELS))
     options = study_options(parser, arguments)
-    record = options.out / "closed_loop.jsonl"
-    text = record.read_text(encoding="utf-8") if record.is_file() else ""
-    runs = [ClosedLoopRun(**json.loads(line)) for line in text.splitlines()]
     console = Console(stderr=True)
-    for seed in range(1, options.seeds + 1):
-        done = {(run.scenario, f"{run.detector} {run.channel}", run.seed) for run in runs}
-        requested = jobs(options.detectors.split(","), options.channels.split(","), seed)
-        left = [job for job in requested if (job.scenario, job.arm, job.seed) not in done]
-        added = run_jobs(left, run_of, workers=options.workers, console=console, title=f"seed {seed}") if left else ()
-        with record.open("a", encoding="utf-8") as lines:
-            lines.writelines(json.dumps(asdict(run)) + "\n" for run in added)
-        runs += added
-    runs.sort(key=attrgetter("detector", "scenario", "channel", "seed"))
+    with ClosedLoopRecord.open(options.out / "closed_loop.jsonl") as record:
+        for seed in range(1, options.seeds + 1):
+            requested = jobs(options.detectors.split(","), options.channels.split(","), seed)
+            left = [job for job in requested if (job.scenario, *job.arm.split(" ", 1), job.seed) not in record.runs]
+            run_jobs(left, run_of, workers=options.workers, console=console, title=f"seed {seed}", finished=record.add)
+    runs = sorted(record.runs.values(), key=attrgetter("detector", "scenario", "channel", "seed"))
     publish(table(runs), options.out / "closed_loop.md")
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
+from eidrive_reports import closed_loop
 from eidrive_reports.closed_loop import ClosedLoopRun, jobs, main, table
 
 
@@ -27,6 +29,18 @@ def test_table_has_one_line_per_arm_with_counts_and_means() -> None:
 def test_jobs_of_seed_contain_all_arms() -> None:
     assert len(jobs(("yolov5", "ssd"), ("none", "ideal"), 1)) == 8
     assert {job.settings.detector for job in jobs(("yolov5",), ("none",), 3)} == {"yolov5"}
+
+
+def test_main_after_incomplete_last_line_repeats_only_that_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a process leaves it that is killed while it writes the second of two runs."""
+    monkeypatch.setattr(closed_loop, "SCENARIOS", ("coop/scenario_1",))
+    monkeypatch.setattr(closed_loop, "run_of", lambda job: row(job.seed, 0, channel=job.settings.channel))
+    record = tmp_path / "closed_loop.jsonl"
+    first = json.dumps(asdict(row(1, 2))) + "\n"
+    record.write_text(first + '{"scenario": "coop/sce')
+    assert main(["--out", str(tmp_path), "--seeds", "1", "--detectors", "oracle", "--workers", "1"]) == 0
+    runs = [ClosedLoopRun(**json.loads(line)) for line in record.read_text().splitlines()]
+    assert runs == [row(1, 2), row(1, 0, channel="ideal")]
 
 
 @pytest.mark.statistical
