@@ -13,7 +13,6 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import attrgetter
-from pathlib import Path
 
 from rich.console import Console
 
@@ -95,11 +94,9 @@ def table(runs: Sequence[ClosedLoopRun]) -> str:
 @command
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("reports"))
-    parser.add_argument("--seeds", type=int, default=20, help="number of seeds, from 1")
     parser.add_argument("--detectors", default=",".join(DETECTORS))
     parser.add_argument("--channels", default=",".join(CHANNELS))
-    options = study_options(parser, arguments)
+    options = study_options(parser, arguments, seeds=20)
     console = Console(stderr=True)
     with ClosedLoopRecord.open(options.out / "closed_loop.jsonl") as record:
         for seed in range(1, options.seeds + 1):

@@ -11,7 +11,6 @@ import argparse
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from operator import attrgetter
-from pathlib import Path
 
 from rich.console import Console
 
@@ -96,9 +95,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     choices = [*ARMS, []]  # argparse compares an empty list of names with the choices, too
     parser.add_argument("names", nargs="*", choices=choices, help="scenarios (default: all)")
-    parser.add_argument("--out", type=Path, default=Path("reports"))
-    parser.add_argument("--seeds", type=int, default=10, help="number of seeds, from 1")
-    options = study_options(parser, arguments)
+    options = study_options(parser, arguments, seeds=10)
     chosen = jobs(options.names or ARMS, range(1, options.seeds + 1))
     runs = run_jobs(chosen, run_of, workers=options.workers, console=Console(stderr=True), title="corner cases")
     publish(table(runs), options.out / "corner_cases.md")

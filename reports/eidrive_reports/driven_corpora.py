@@ -153,7 +153,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("groups", nargs="*", help=f"groups, all by default: {names}")
     parser.add_argument("--planner", default=DEFAULT)
     parser.add_argument("--samples", type=positive, default=200, help="number of runs of a distribution")
-    parser.add_argument("--out", type=Path, default=Path("reports"))
     parser.add_argument("--resume", action="store_true", help="keep the runs of an earlier call")
     options = study_options(parser, arguments)
     try:

@@ -111,7 +111,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--planner", default=DEFAULT)
     parser.add_argument("--samples", type=positive, default=200, help="number of runs of a distribution")
     parser.add_argument(REFERENCE_OPTION, metavar="CONTROLLER=MODEL", help="controller model of the reference driver")
-    parser.add_argument("--out", type=Path, default=Path("reports"))
     parser.add_argument("--resume", action="store_true", help="keep the runs of an earlier call")
     options = study_options(parser, arguments)
     name, separator, model = (options.reference or "").partition("=")

@@ -154,10 +154,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the distributions and draw their heat maps into a folder."""
     parser = argparse.ArgumentParser(description="Draw outcomes over two parameters, by cooperation and latency.")
     parser.add_argument("distributions", nargs="*", default=DISTRIBUTIONS, help="files, or names in the library")
-    parser.add_argument("--out", type=Path, default=Path("reports/heat_maps"))
     parser.add_argument("--param", action="append", default=[], metavar="NAME=VALUE", help="parameter of all runs")
     parser.add_argument("--seed", type=int, default=1)
-    options = study_options(parser, arguments)
+    options = study_options(parser, arguments, out="reports/heat_maps")
     invalid = [text for text in options.param if "=" not in text]
     if invalid:
         parser.error(f"--param: not NAME=VALUE (got {invalid[0]!r})")

@@ -350,13 +350,11 @@ def draw(runs: Sequence[OvertakingRun], path: Path) -> None:
 @command
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("reports"))
     parser.add_argument("--figures", type=Path, default=None, help="folder of the figure (default: --out)")
-    parser.add_argument("--seeds", type=int, default=5, help="number of seeds of each gap, from 1")
     parser.add_argument("--drives", type=int, default=1000, help="number of random drives with the oracle")
     parser.add_argument("--detector", action="append", default=None, metavar="NAME", help="for random drives, too")
     parser.add_argument("--detector-drives", type=int, default=100, help="number of random drives of each detector")
-    options = study_options(parser, arguments)
+    options = study_options(parser, arguments, seeds=5)
     folder = options.out / "overtaking"
     write_road(folder)
     gaps, drives = [], []
@@ -374,10 +372,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             drives.append(Job(str(path), detector, seed, _settings(detector)))
     runs = run_jobs([*gaps, *drives], run_of, workers=options.workers, console=Console(stderr=True), title="overtaking")
     accepted, random = runs[: len(gaps)], runs[len(gaps) :]
-    result = "\n".join(text for text, some in ((gap_table(accepted), gaps), (drive_table(random), drives)) if some)
-    if gaps:
-        draw(accepted, (options.figures or options.out) / "overtaking.png")
-    publish(result, options.out / "overtaking.md")
+    draw(accepted, (options.figures or options.out) / "overtaking.png")
+    tables = [gap_table(accepted), *([drive_table(random)] if drives else [])]
+    publish("\n".join(tables), options.out / "overtaking.md")
 
 
 def _settings(detector: str) -> RunSettings:

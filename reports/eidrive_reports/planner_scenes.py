@@ -11,7 +11,6 @@ import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from rich.console import Console
 
@@ -104,9 +103,7 @@ def scenes() -> list[str]:
 @command
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("reports"))
-    parser.add_argument("--seeds", type=int, default=10, help="number of seeds, from 1")
-    options = study_options(parser, arguments)
+    options = study_options(parser, arguments, seeds=10)
     contact = {"collision": {"of": EGO, "name": CONTACT}}
     arms = {planner: RunSettings(parameters={"Planner": planner}, criteria=contact) for planner in PLANNERS}
     seeds = range(1, options.seeds + 1)

@@ -61,8 +61,17 @@ def command(main: Callable[[Sequence[str] | None], None]) -> Command:
     return run
 
 
-def study_options(parser: argparse.ArgumentParser, arguments: Sequence[str] | None) -> argparse.Namespace:
-    """Return the options of a study, with `--workers` in addition, and create the folder of its results."""
+def study_options(
+    parser: argparse.ArgumentParser, arguments: Sequence[str] | None, *, seeds: int | None = None, out: str = "reports"
+) -> argparse.Namespace:
+    """Return the options of a study, with `--out` and `--workers` in addition, and create the folder of its results.
+
+    seeds  default of the option `--seeds`; None for a study without it
+    out    default of `--out`
+    """
+    parser.add_argument("--out", type=Path, default=Path(out))
+    if seeds is not None:
+        parser.add_argument("--seeds", type=positive, default=seeds, help="number of seeds, from 1")
     parser.add_argument("--workers", type=positive, default=None, help="processes; all cores by default")
     options = parser.parse_args(arguments)
     options.out.mkdir(parents=True, exist_ok=True)

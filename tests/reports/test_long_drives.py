@@ -112,9 +112,13 @@ def test_main_drives_a_ring_with_traffic_to_the_end(tmp_path: Path, capsys: pyte
 
 @pytest.mark.parametrize(
     ("option", "message"),
-    [(("--minutes", "0"), "invalid minutes value"), (("--minutes", "nan"), "invalid minutes value")],
+    [
+        (("--minutes", "0"), "invalid minutes value"),
+        (("--minutes", "nan"), "invalid minutes value"),
+        (("--seeds", "0"), "argument --seeds: not a positive number (got 0)"),
+    ],
 )
-def test_drive_without_a_duration_is_an_error(
+def test_drive_without_a_duration_or_a_seed_is_an_error(
     option: tuple[str, str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit):

@@ -9,6 +9,7 @@ import pytest
 from eidrive_reports.studies import markdown_table, publish
 
 STUDIES = ("closed_loop", "corner_cases", "demo", "driven_corpora", "heat_maps", "overtaking", "planner_scenes")
+SEEDED = ("closed_loop", "corner_cases", "overtaking", "planner_scenes")
 
 
 def test_table_has_header_rule_and_one_line_per_row() -> None:
@@ -23,24 +24,29 @@ def test_result_is_written_to_file_and_standard_output(tmp_path: Path, capsys: p
     assert (tmp_path / "out" / "table.md").read_text(encoding="utf-8") == capsys.readouterr().out == "| ² |\n"
 
 
-@pytest.mark.parametrize("study", STUDIES)
-def test_number_of_processes_of_each_study_is_positive(
-    study: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("study", "option"),
+    [*((study, "--workers") for study in STUDIES), *((study, "--seeds") for study in ("demo", *SEEDED))],
+)
+def test_numbers_of_processes_and_seeds_of_each_study_are_positive(
+    study: str, option: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as ended:
-        importlib.import_module(f"eidrive_reports.{study}").main(["--workers", "0"])
+        importlib.import_module(f"eidrive_reports.{study}").main([option, "0"])
     assert ended.value.code == 2
-    assert "argument --workers: not a positive number (got 0)" in capsys.readouterr().err
+    assert f"argument {option}: not a positive number (got 0)" in capsys.readouterr().err
     assert not any(tmp_path.iterdir()), "an invalid call writes nothing"
 
 
-@pytest.mark.parametrize("study", ["closed_loop", "corner_cases", "overtaking", "planner_scenes"])
+@pytest.mark.parametrize("study", SEEDED)
 def test_error_of_an_output_is_a_message_and_exit_code_2(
-    study: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    study: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The name of the table is that of a folder."""
+    """The name of the table is that of a folder. No run is made."""
     (tmp_path / f"{study}.md").mkdir()
-    none = ["--seeds", "0", *(["--drives", "0"] if study == "overtaking" else [])]
-    assert importlib.import_module(f"eidrive_reports.{study}").main(["--out", str(tmp_path), *none]) == 2
+    module = importlib.import_module(f"eidrive_reports.{study}")
+    monkeypatch.setattr(module, "run_jobs", lambda *jobs, **options: [])
+    few = ["--seeds", "1", *(["--drives", "0"] if study == "overtaking" else [])]
+    assert module.main(["--out", str(tmp_path), *few]) == 2
     assert f"{study}.md: cannot write" in capsys.readouterr().err
