@@ -12,6 +12,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from rich.console import Console
 
 from eidrive_reports.driven_runs import CONTACT, decelerations
@@ -60,7 +61,6 @@ def run_of(job: Job) -> SceneRun:
             plan = frame.steps[EGO].plan
             target = max(target, float(plan.speeds.max()) if plan is not None else 0.0)
         result = simulation.result()
-    dt = times[1] - times[0] if len(times) > 1 else 0.0
     return SceneRun(
         job.scenario,
         job.arm,
@@ -68,10 +68,15 @@ def run_of(job: Job) -> SceneRun:
         collided=result.metrics.get(f"{CONTACT}.count", 0.0) > 0.0,
         at_fault=result.metrics.get(f"{CONTACT}.at_fault", 0.0) > 0.0,
         arrived=_passed(result, "reach_position"),
-        lost=times[-1] - times[0] - sum(speeds) * dt / max(target, 1.0),
+        lost=time_lost(times, speeds, max(target, 1.0)),
         braking=float(decelerations(times, speeds).max(initial=0.0)),
         detected=next((verdict.value for verdict in result.criteria if verdict.name == "first_detection"), None),
     )
+
+
+def time_lost(times: Sequence[float], speeds: Sequence[float], target: float) -> float:
+    """Return the time in addition to the same distance at the target speed [s], from speeds at times [m/s, s]."""
+    return times[-1] - times[0] - float(np.trapezoid(speeds, times)) / target
 
 
 def _passed(result: RunResult, name: str) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from eidrive_reports.corner_cases import ALONE, ARMS, jobs, table
-from eidrive_reports.planner_scenes import SceneRun
+from eidrive_reports.planner_scenes import SceneRun, time_lost
 
 from eidrive_scenario.extensions.library import describe_scenarios, resolve_scenario
 from eidrive_scenario.openscenario import load_scenario
@@ -22,6 +22,12 @@ def test_jobs_contain_the_arm_without_messages_and_all_seeds() -> None:
     assert len(found) == 2 * (1 + len(ARMS["jammer"]))
     assert [job.seed for job in found if job.arm == ALONE] == [1, 2]
     assert dict(found[0].settings.parameters or {}) == {"Participants": "none"}
+
+
+def test_time_lost_is_that_beyond_the_distance_at_target_speed() -> None:
+    """At 10 m/s nothing is lost; from 10 to 0 m/s in 2 s, 10 m are 1 s at 10 m/s."""
+    assert time_lost([1.0, 2.0, 3.0], [10.0, 10.0, 10.0], 10.0) == 0.0
+    assert time_lost([1.0, 2.0, 3.0], [10.0, 5.0, 0.0], 10.0) == 1.0
 
 
 def test_table_averages_runs_that_arrived_and_brakings_without_collision() -> None:
