@@ -72,11 +72,13 @@ class PairCriterion(Criterion):
         if of is None or to is None:
             return
         self._together = True
-        value = self.measure(view, of, to)
+        self._add(self.measure(view, of, to), view.time)
+
+    def _add(self, value: float, time: float) -> None:
         if value < self.smallest:
-            self.smallest, self.when = value, view.time
+            self.smallest, self.when = value, time
         if self._violated is None and falls_below(value, self.limit):
-            self._violated = view.time
+            self._violated = time
 
     def verdict(self) -> Verdict:
         if self._together:
@@ -91,6 +93,10 @@ class PairCriterion(Criterion):
             limit=self.limit,
             first_violation=self._violated,
         )
+
+    def metrics(self) -> Mapping[str, float]:
+        """Return the minimum; empty without a value."""
+        return {f"{self.name}.{self.of}.{self.to}": self.smallest} if math.isfinite(self.smallest) else {}
 
 
 class SurroundedCriterion(Criterion):

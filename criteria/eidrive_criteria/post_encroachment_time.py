@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from eidrive_criteria.folds import falls_below
 from eidrive_criteria.pairs import PairCriterion, PairSettings, has_contact
 from eidrive_scenario.api.common import WorldView
 from eidrive_scenario.api.criteria import Continuity, Frame, half_projection, separating_axes
@@ -83,11 +82,7 @@ class PostEncroachmentTime(PairCriterion):
             if row is not None:
                 self._missing.discard(name)
         self._together = not self._missing
-        value = self.measure(view, 0, 0)
-        if value < self.smallest:
-            self.smallest, self.when = value, view.time
-        if self._violated is None and falls_below(value, self.limit):
-            self._violated = view.time
+        self._add(self.measure(view, 0, 0), view.time)
 
     def measure(self, view: WorldView, of: int, to: int) -> float:
         """Return the smaller time of both orders with an arrival in this frame; infinite if there is none."""
@@ -103,11 +98,6 @@ class PostEncroachmentTime(PairCriterion):
         return (
             f"{self.of} and {self.to} were at one place {self.smallest:.2f} s apart, the later one at {self.when:.2f} s"
         )
-
-    def metrics(self) -> Mapping[str, float]:
-        """Return the minimum post-encroachment time [s]; empty without a common place."""
-        pair = f"{self.name}.{self.of}.{self.to}"
-        return {pair: self.smallest} if math.isfinite(self.smallest) else {}
 
 
 def time_between(leaving: Trail, arriving: Trail, now: float, below: float = math.inf) -> float:

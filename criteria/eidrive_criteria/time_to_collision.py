@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 from eidrive_criteria.accelerated_contact import accelerated_contact, course
 from eidrive_criteria.pairs import PairCriterion, PairSettings, has_contact
@@ -43,8 +42,3 @@ class TimeToCollision(PairCriterion):
         if not math.isfinite(self.smallest):
             return f"{self.of} and {self.to} were never on a collision course"
         return f"{self.of} and {self.to} were {self.smallest:.2f} s from a collision at {self.when:.2f} s"
-
-    def metrics(self) -> Mapping[str, float]:
-        """Return the minimum time to collision [s]; empty without a collision course."""
-        pair = f"{self.name}.{self.of}.{self.to}"
-        return {pair: self.smallest} if math.isfinite(self.smallest) else {}
