@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from operator import attrgetter
 from typing import Any
 
+from eidrive_reports.paper import EGO
 from eidrive_reports.studies import group_by
 from eidrive_scenario.api.common import Diagnostic, SettingError, quoted, registry
 from eidrive_scenario.api.experiments import describe_scenarios, resolve_scenario
@@ -160,7 +161,6 @@ PARTNERS = {
     "ncap/crossing_child": "Walker",
 }
 """Actor whose minimum distance to the ego is measured, where the scenario has no criterion for it."""
-EGO = "Ego"
 FIELD_OF_VIEW = {f"coop/scenario_{number}": 100 for number in (5, 6, 7, 8)}
 """Horizontal field of view that the stations of a scenario declare [degrees], where its outcome depends on it."""
 

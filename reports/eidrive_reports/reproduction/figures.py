@@ -23,7 +23,7 @@ Tables = Mapping[str, Sequence[Row]]
 """Rows of the tables of a part by the name of their file."""
 FAULT_STYLES = {"independent": ("#0072b2", "o"), "bursty": ("#d55e00", "s"), "radio": ("#009e73", "^")}
 """Colors of Okabe and Ito, which color-blind readers can distinguish, and markers."""
-ACCESS_STYLES = (("#0072b2", "o"), ("#d55e00", "s"), ("#009e73", "^"))
+ACCESS_STYLES = tuple(FAULT_STYLES.values())
 
 
 def channels_figure(data: Tables) -> Figure:
