@@ -21,7 +21,7 @@ from eidrive_scenario.errors import Diagnostic, InvalidResult, SettingError, sug
 from eidrive_scenario.evaluation.criterion import Criterion, CriterionSettings, Verdict
 from eidrive_scenario.extensions.registry import construct, registry
 from eidrive_scenario.extensions.settings import parse_settings, settings_type_of
-from eidrive_scenario.files.yaml_text import flow_yaml, key_lines, load_yaml
+from eidrive_scenario.files.yaml_text import flow_yaml, load_yaml_text
 from eidrive_scenario.openscenario import Scenario
 from eidrive_scenario.openscenario.conventions import CRITERION_PREFIX, criteria_of, property_entries
 from eidrive_scenario.openscenario.model import Condition, Vehicle
@@ -163,12 +163,9 @@ def parse_criteria(
 
     Raise SettingError with file and line of every error.
     """
-    data = load_yaml(text, source=source, line=line)
-    known_lines = key_lines(text, 1 if line is None else line)
+    data, lines = load_yaml_text(text, source=source, line=line)
     shown = repr(text.strip())
-    return declare_criteria(
-        data, known_lines, context, source=source, line=line, scope=scope, command=CRITERION, shown=shown
-    )
+    return declare_criteria(data, lines, context, source=source, line=line, scope=scope, command=CRITERION, shown=shown)
 
 
 def declare_criteria(
@@ -184,7 +181,7 @@ def declare_criteria(
 ) -> tuple[CriterionDeclaration, ...]:
     """Return the criteria that parsed YAML declares: a mapping, or a list of mappings.
 
-    known_lines  lines of the keys as returned by `key_lines`
+    known_lines  lines of the keys as returned by `load_yaml_text`
     command      type of the command that contains them, for messages
     shown        text of the data in messages; the other arguments are those of `parse_criteria`
 

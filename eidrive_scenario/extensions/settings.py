@@ -41,7 +41,7 @@ def parse_settings(
 ) -> S:
     """Return `data` as an instance of `model`.
 
-    lines    lines of single keys, with the paths of `key_lines`; `line` applies to all others
+    lines    lines of single keys, with the paths of `load_yaml_text`; `line` applies to all others
     origins  origins of values from elsewhere, such as a parameter, by these paths; an error of the value names it
     paths    paths of keys for errors, if the user wrote them into another mapping; other keys are their own paths
 

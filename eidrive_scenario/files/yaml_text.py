@@ -145,19 +145,20 @@ if yaml.__with_libyaml__:
             super().__init__()
 
 
-def load_yaml(text: str, *, source: str, line: int | None = None, quote: bool = True) -> Any:
+def load_yaml(text: str, *, source: str, line: int | None = None) -> Any:
     """Load YAML without object tags, aliases and merge keys, of bounded size and depth.
-
-    quote  whether messages may quote words of the text; False for files, which may be of another kind
 
     A duplicate key is an error, as one of its values would be lost. Raise SettingError with the line of the error,
     counted from `line` if given.
     """
-    return _load(text, source, line, quote)[0]
+    return load_yaml_text(text, source=source, line=line)[0]
 
 
 def _load(text: str, source: str, line: int | None, quote: bool) -> tuple[Any, dict[str, int]]:
-    """Return the data of a text as `load_yaml`, and the line of each key, from 0."""
+    """Return the data of a text as `load_yaml`, and the line of each key, from 0.
+
+    quote  whether messages may quote words of the text; False for files, which may be of another kind
+    """
     if len(text) > MAX_YAML:
         diagnostic = Diagnostic(f"not valid YAML: more than {MAX_YAML} characters", "shorten it", source, line)
         raise SettingError(diagnostic)
@@ -189,25 +190,26 @@ def load_yaml_file(path: Path, hint: str = "give the path of a YAML file") -> tu
     return data, {key: line + 1 for key, line in lines.items()}
 
 
-def key_lines(text: str, first: int = 1) -> dict[str, int]:
-    """Return the line of each key of a text that `load_yaml` accepts; the first line has the number `first`.
+def load_yaml_text(text: str, *, source: str, line: int | None = None) -> tuple[Any, dict[str, int]]:
+    """Return the data of a text and the line of each key, counted from `line` if given. Raise as `load_yaml`.
 
     Nested keys are joined by dots, and entries of lists are numbered: `delay`, `delay.seconds`, `limits.0`.
     """
-    return {path: first + line for path, line in _parse(text)[1].items()}
+    data, lines = _load(text, source, line, quote=True)
+    return data, {key: (line or 1) + below for key, below in lines.items()}
 
 
 def load_mapping(
     text: str, name: str, hint: str, *, source: str, line: int | None
 ) -> tuple[dict[Any, Any], dict[str, int]]:
-    """Return the mapping in the text of `name`, and the line of each key as `key_lines`.
+    """Return the mapping in the text of `name`, and the line of each key as `load_yaml_text`.
 
     Raise SettingError as `load_yaml`, or with this hint if the text is no mapping.
     """
-    data, lines = _load(text, source, line, quote=True)
+    data, lines = load_yaml_text(text, source=source, line=line)
     if not isinstance(data, dict):
         raise SettingError(Diagnostic(f"{name} is {quoted(data)}", hint, source, line))
-    return data, {key: (line or 1) + below for key, below in lines.items()}
+    return data, lines
 
 
 def _parse(text: str) -> tuple[Any, dict[str, int]]:
@@ -247,7 +249,7 @@ _INLINE = ("{", "[", "\n", ": ")
 
 @dataclass(frozen=True)
 class YamlContent:
-    """Parsed content, its file or option, and the lines of its keys as returned by `key_lines`; none for a text."""
+    """Parsed content, its file or option, and the lines of its keys as of `load_yaml_text`; none for a text."""
 
     data: Any
     source: str

@@ -13,7 +13,7 @@ from eidrive_scenario.extensions.registry import construct, registry
 from eidrive_scenario.extensions.settings import Settings, parse_settings, settings_type_of
 from eidrive_scenario.files.bounded import is_regular_file, path_argument
 from eidrive_scenario.files.similar_paths import file_suggestion
-from eidrive_scenario.files.yaml_text import key_lines, load_yaml, load_yaml_file
+from eidrive_scenario.files.yaml_text import load_yaml_file, load_yaml_text
 from eidrive_scenario.openscenario.values.parameters import Scope, is_reference, parameter_hints, resolve_references
 from eidrive_scenario.v2x.channel import Channel
 
@@ -63,9 +63,8 @@ def load_profile(
     if isinstance(source, str):
         text = source.strip()
         if _is_inline(text):
-            data = load_yaml(source, source=origin or "channel", line=line)
-            lines = {} if line is None else key_lines(source, line)
-            return _parse(data, "custom", origin or "channel", line, lines, scope)
+            data, lines = load_yaml_text(source, source=origin or "channel", line=line)
+            return _parse(data, "custom", origin or "channel", line, {} if line is None else lines, scope)
         if not text:
             message = "channel name is empty"
             raise SettingError(Diagnostic(message, "expected a profile such as `ideal`, or `none`", origin, line))

@@ -351,7 +351,7 @@ def resolve_references(
     data   mappings, lists and scalars from YAML; keys are not changed
     scope  visible parameters; None leaves the data unchanged
     line   line of the settings
-    lines  lines of single keys, by their dotted path from `path` on, as returned by `key_lines`
+    lines  lines of single keys, by their dotted path from `path` on, as returned by `load_yaml_text`
 
     Raise SettingError with one diagnostic per unknown parameter or invalid expression.
     """

@@ -16,7 +16,7 @@ from eidrive_scenario.evaluation.criteria_parser import (
 )
 from eidrive_scenario.evaluation.criterion import Criterion, Verdict, evaluate_criteria
 from eidrive_scenario.extensions.registry import Registry
-from eidrive_scenario.files.yaml_text import load_yaml
+from eidrive_scenario.files.yaml_text import load_yaml_text
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.simulation import Simulation
 from eidrive_scenario.storyboard.state.commands import CustomCommand
@@ -91,9 +91,9 @@ def test_run_parses_each_criterion_command_once(monkeypatch: pytest.MonkeyPatch)
 
     def counted(text: str, **given: object) -> object:
         texts.append(text)
-        return load_yaml(text, **given)  # type: ignore[arg-type]
+        return load_yaml_text(text, **given)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(criteria_parser, "load_yaml", counted)
+    monkeypatch.setattr(criteria_parser, "load_yaml_text", counted)
     with Simulation("coop/scenario_1") as simulation:
         simulation.tick()
         assert {criterion.name for criterion in simulation.criteria} >= {"collision", "min_distance"}

@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.files.yaml_text import MAX_DEPTH, MAX_NODES, key_lines, load_yaml
+from eidrive_scenario.files.yaml_text import MAX_DEPTH, MAX_NODES, load_yaml, load_yaml_text
 
 OBJECTS = """# objects of a frame
 lidar_pose:
@@ -37,14 +37,14 @@ def padded(text: str) -> str:
 @pytest.mark.usefixtures("parser")
 def test_yaml_of_a_dataset_has_its_values_and_lines_by_each_parser() -> None:
     text = padded(OBJECTS)
-    assert load_yaml(text, source="") == {
+    data, lines = load_yaml_text(text, source="")
+    assert data == {
         "lidar_pose": [-12.5, 3.0, 1.9],
         "vehicles": {
             107: {"angle": [0.0, 90.0, 0.0], "extent": [2.4, 1.0, 0.75], "obj_type": "car"},
             108: {"angle": [0.0, "-1e-05", 0.5], "obj_type": "a: word"},
         },
     }
-    lines = key_lines(text)
     assert (lines["lidar_pose.2"], lines["vehicles.107.extent"], lines["vehicles.108.obj_type"]) == (5, 7, 10)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.files.yaml_text import key_lines, load_yaml
+from eidrive_scenario.files.yaml_text import load_yaml, load_yaml_text
 from eidrive_scenario.openscenario.diagnostics import DiagnosticCollector
 from eidrive_scenario.openscenario.model import ParameterDeclaration, ParameterType
 from eidrive_scenario.openscenario.values.parameters import Scope, declare, hide_parameters, resolve_references
@@ -32,7 +32,8 @@ SCOPE = scope_of(
 
 
 def resolved(text: str, scope: Scope | None = SCOPE) -> Any:
-    return resolve_references(load_yaml(text, source="a.xosc", line=10), scope, source="a.xosc", lines=key_lines(text))
+    data, lines = load_yaml_text(text, source="a.xosc")
+    return resolve_references(data, scope, source="a.xosc", lines=lines)
 
 
 @pytest.mark.parametrize(
@@ -118,9 +119,10 @@ def test_unclosed_expression_is_invalid_yaml(text: str) -> None:
 
 def test_changed_data_of_a_text_is_not_returned_again() -> None:
     text = "{limits: [1, 2], of: {name: Ego}}"
-    data, lines = load_yaml(text, source="a.xosc"), key_lines(text)
+    data, lines = load_yaml_text(text, source="a.xosc")
     data["limits"].append(3)
     data["of"]["name"] = "Other"
     lines.clear()
-    assert load_yaml(text, source="a.xosc") == {"limits": [1, 2], "of": {"name": "Ego"}}
-    assert key_lines(text, 7) == {"limits": 7, "limits.0": 7, "limits.1": 7, "of": 7, "of.name": 7}
+    data, lines = load_yaml_text(text, source="a.xosc", line=7)
+    assert data == {"limits": [1, 2], "of": {"name": "Ego"}}
+    assert lines == {"limits": 7, "limits.0": 7, "limits.1": 7, "of": 7, "of.name": 7}
