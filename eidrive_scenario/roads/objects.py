@@ -21,8 +21,9 @@ LONGEST_PART = 5.0
 class PlacedObject(NamedTuple):
     """One object in the world: pose of its base; length, width and height [m], 0 if the map omits them.
 
-    shift  distance along s and t by which a repetition moves the outlines of the object [m]; None for a part of an
-           object that repeats without gaps: it has the cross section of its width and height
+    z_offset  height of its base above the road [m]
+    shift     distance along s and t by which a repetition moves the outlines of the object [m]; None for a part of an
+              object that repeats without gaps: it has the cross section of its width and height
     """
 
     object: RoadObject
@@ -30,6 +31,7 @@ class PlacedObject(NamedTuple):
     length: float
     width: float
     height: float
+    z_offset: float
     shift: tuple[float, float] | None = (0.0, 0.0)
 
 
@@ -42,7 +44,7 @@ def placed_objects(network: RoadNetwork) -> Iterator[PlacedObject]:
             width = 2.0 * road_object.radius or road_object.width
             length = 2.0 * road_object.radius or road_object.length
             pose = _pose(network, road_object, road_object.s, road_object.t, road_object.z_offset)
-            yield PlacedObject(road_object, pose, length, width, road_object.height)
+            yield PlacedObject(road_object, pose, length, width, road_object.height, road_object.z_offset)
 
 
 def crosswalks(network: RoadNetwork) -> tuple[Array, ...]:
@@ -123,7 +125,8 @@ def _repeated(network: RoadNetwork, road_object: RoadObject) -> Iterator[PlacedO
                 length = math.hypot(dx, dy)
                 pose = pose._replace(x=start.x + 0.5 * dx, y=start.y + 0.5 * dy, h=math.atan2(dy, dx))
             height = height or road_object.height
-            yield PlacedObject(road_object, pose, length, width, height, None if gapless else shift)
+            z_offset = repeat.z_offset[0] + (repeat.z_offset[1] - repeat.z_offset[0]) * share
+            yield PlacedObject(road_object, pose, length, width, height, z_offset, None if gapless else shift)
 
 
 def _pose_in_repetition(network: RoadNetwork, road_object: RoadObject, repeat: Repeat, ds: float) -> Pose:

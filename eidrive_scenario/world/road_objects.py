@@ -14,6 +14,7 @@ import numpy as np
 
 from eidrive_scenario.base.arrays import Array
 from eidrive_scenario.roads import PlacedObject, Pose, RoadNetwork, Signal, lines, outlines, placed_objects
+from eidrive_scenario.roads.model.road_map import Corner
 from eidrive_scenario.world.actor import Vector3
 
 SIZES: Mapping[str, tuple[float, float, float]] = {
@@ -220,7 +221,8 @@ def object_bodies(roads: RoadNetwork, placed: PlacedObject) -> Iterator[RoadObje
         elif placed.shift is not None and (kind in ("pole", "lamp", "guide post") or road_object.radius):
             yield RoadObjectBody(name, kind, pose, length, width, height, max(length, width) / 2)
         else:
-            yield RoadObjectBody(name, kind, pose, length, width, height, solid=height >= STEP or pose.z > 0.0)
+            is_solid = height >= STEP or _height_above_road(placed) > 0.0
+            yield RoadObjectBody(name, kind, pose, length, width, height, solid=is_solid)
 
 
 def _overhangs(roads: RoadNetwork, pose: Pose, length: float, width: float) -> bool:
@@ -236,8 +238,18 @@ def _overhangs(roads: RoadNetwork, pose: Pose, length: float, width: float) -> b
 def object_height(placed: PlacedObject) -> float:
     """Return the maximum height at the corners of an object, which outlines define, or else its height [m]; 0 if the
     map omits them."""
+    return max((corner.height for corner in _corners(placed)), default=0.0) or placed.height
+
+
+def _height_above_road(placed: PlacedObject) -> float:
+    """Return the height of the lowest corner of an object above the road, or of its base without corners [m]."""
+    heights = (corner.z + (0.0 if corner.on_road else placed.z_offset) for corner in _corners(placed))
+    return min(heights, default=placed.z_offset)
+
+
+def _corners(placed: PlacedObject) -> list[Corner]:
     outlines_and_lines = () if placed.shift is None else (*placed.object.outlines, *placed.object.lines)
-    return max((corner.height for corners in outlines_and_lines for corner in corners), default=0.0) or placed.height
+    return [corner for corners in outlines_and_lines for corner in corners]
 
 
 def footprint(roads: RoadNetwork, placed: PlacedObject) -> list[tuple[Pose, float, float]]:

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import pytest
-from opendrive_xml import lanes_xml, map_xml, road_xml
+from opendrive_xml import elevation_xml, lanes_xml, map_xml, road_xml
 
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.objects import crosswalks
@@ -15,11 +15,11 @@ from eidrive_scenario.world.actor import ActorSpec, Control, Placement
 from eidrive_scenario.world.road_objects import RoadObjectBody, road_object_bodies, signal_heads
 
 
-def network(*objects: str, signals: str = "", heading: float = 0.0) -> RoadNetwork:
+def network(*objects: str, signals: str = "", heading: float = 0.0, profiles: str = "") -> RoadNetwork:
     """Return a street along x whose only lane has its center at y = -2, with objects by their attributes."""
     listed = "".join(f'<object id="{number}" hdg="{heading}" {one}</object>' for number, one in enumerate(objects))
     extra = f"<objects>{listed}</objects><signals>{signals}</signals>"
-    return RoadNetwork.parse(map_xml(road_xml(length=200.0, lanes=lanes_xml(0, 1, 4), extra=extra)))
+    return RoadNetwork.parse(map_xml(road_xml(length=200.0, profiles=profiles, lanes=lanes_xml(0, 1, 4), extra=extra)))
 
 
 def only(*objects: str) -> RoadObjectBody:
@@ -108,6 +108,25 @@ def test_outline_replaces_height_and_base_of_the_object() -> None:
     road = "".join(f'<cornerRoad s="{s}" t="{t}" dz="0.5" height="2"/>' for s, t in ((50, -8), (54, -8), (50, -6)))
     body = only(f"{size}><outline>{road}</outline>")
     assert (body.pose.z, body.height) == (0.5, 2.0)
+
+
+@pytest.mark.parametrize("elevation", [0.0, 5.0, -5.0])
+@pytest.mark.parametrize(
+    ("rest", "is_solid"),
+    [
+        ('zOffset="0">', False),
+        ('zOffset="0.8">', True),
+        ('zOffset="0.8"><repeat s="50" length="0" distance="1" zOffsetStart="0" zOffsetEnd="0"/>', False),
+        (f'zOffset="0"><outline>{"".join(LOCAL)}</outline>', False),
+        (f'zOffset="0.8"><outline>{"".join(LOCAL)}</outline>', True),
+        (f'zOffset="0.8"><outline>{"".join(ON_ROAD)}</outline>', False),
+    ],
+)
+def test_low_object_is_solid_if_raised_above_road(rest: str, is_solid: bool, elevation: float) -> None:
+    """Objects of 0.15 m are driven over unless they are above the road, whatever the height of the road is."""
+    text = f'type="barrier" s="50" t="-2" length="2" width="1" height="0.15" {rest}'.replace("1.2", "0.15")
+    (body,) = road_object_bodies(network(text, profiles=elevation_xml(elevation)))
+    assert body.solid == is_solid
 
 
 @pytest.mark.parametrize("orientation", ["+", "-", "none"])
