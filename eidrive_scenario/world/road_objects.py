@@ -202,16 +202,17 @@ def object_bodies(roads: RoadNetwork, placed: PlacedObject) -> Iterator[RoadObje
     """Yield the bodies of an object; none if it is painted on the road, or a building."""
     road_object = placed.object
     kind = KINDS.get(road_object.type)
-    if kind is None and road_object.type in WITHOUT_TYPE and min(placed.length, placed.width, placed.height) >= STEP:
-        kind = "obstacle"
+    boxes, height = footprint(roads, placed), object_height(placed)
+    if kind is None and road_object.type in WITHOUT_TYPE and height >= STEP:
+        kind = "obstacle" if any(min(length, width) >= STEP for _, length, width in boxes) else None
     if kind is None:
         return
     usual = SIZES[kind]
-    height = object_height(placed) or usual[2]
+    height = height or usual[2]
     if height < LEAST:
         return
     name = road_object.name or f"{kind} {road_object.id}"
-    for pose, given_length, given_width in footprint(roads, placed):
+    for pose, given_length, given_width in boxes:
         length, width = given_length or usual[0], given_width or usual[1]
         is_crown = road_object.type in WITHOUT_TYPE and height > HEADROOM and _overhangs(roads, pose, length, width)
         if kind == "tree" or is_crown:

@@ -89,9 +89,10 @@ def test_high_object_of_unknown_type_over_a_lane_is_a_tree(t: float, size: float
     assert only(text).kind == kind
 
 
-def test_outline_determines_position_and_size() -> None:
+@pytest.mark.parametrize("kind", ["obstacle", "none"])
+def test_outline_determines_position_and_size(kind: str) -> None:
     corners = "".join(f'<cornerLocal u="{u}" v="{v}" z="0" height="1.2"/>' for u, v in ((0, 0), (6, 0), (6, 2), (0, 2)))
-    piece = only(f'type="obstacle" s="50" t="-10" zOffset="0"><outline>{corners}</outline>')
+    piece = only(f'type="{kind}" s="50" t="-10" zOffset="0"><outline>{corners}</outline>')
     assert (piece.pose.x, piece.pose.y, piece.length, piece.width, piece.height) == (53.0, -9.0, 6.0, 2.0, 1.2)
 
 
