@@ -13,6 +13,7 @@ from eidrive_scenario.export.osi.schemas import Identifiers, Osi, set_orientatio
 from eidrive_scenario.roads import PlacedObject, Pose, RoadNetwork, outlines, placed_objects
 from eidrive_scenario.world.road_objects import (
     KINDS,
+    LEAST,
     SIZES,
     STEP,
     STOREY,
@@ -82,7 +83,7 @@ def _solids(roads: RoadNetwork, placed: PlacedObject) -> Iterator[_Solid]:
     is_building = road_object.type == "building"
     kind = "building" if is_building else KINDS.get(road_object.type, "")
     height = object_height(placed) or (STOREY if is_building else SIZES[kind][2] if kind else 0.0)
-    is_solid = bool(kind) or (road_object.type in WITHOUT_TYPE and height >= STEP)
+    is_solid = height >= LEAST if kind else road_object.type in WITHOUT_TYPE and height >= STEP
     if is_solid and placed.shift is not None and len(road_object.outlines) == 1 and not road_object.lines:
         (polygon,) = outlines(roads, placed)
         yield _Solid(kind, *bounding_box(roads, placed), height, polygon[:, :2])

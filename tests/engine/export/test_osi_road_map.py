@@ -242,6 +242,13 @@ def test_painted_areas_are_no_stationary_objects(kind: str) -> None:
     assert not truths(street(objects=text))[0].stationary_object
 
 
+def test_object_below_minimum_height_is_no_stationary_object() -> None:
+    """Objects lower than 0.1 m are painted in the simulation, too."""
+    corners = "".join(f'<cornerLocal u="{u}" v="{v}" z="0" height="0.05"/>' for u, v in ((0, 0), (4, 0), (4, 2)))
+    text = object_text("7", "trafficIsland", "", f"<outline>{corners}</outline>")
+    assert not truths(street(objects=text))[0].stationary_object
+
+
 def test_road_object_that_is_an_entity_is_no_stationary_object(tmp_path: Path) -> None:
     box = object_text("gate", "barrier", 'length="4" width="1" height="1"')
     road = tmp_path / "street.xodr"
