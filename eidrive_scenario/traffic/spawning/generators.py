@@ -367,10 +367,10 @@ class BackgroundTraffic:
     def _run_generators(self, view: WorldView) -> None:
         """Observe the other actors and run the generators."""
         self._begun = False
+        self.instances = [instance for instance in self.instances if instance.active]
         growing = any(instance.is_due(self.population) for instance in self.instances)
         self.fleet.observe(view, everywhere=growing)
         if growing:
             self.population.observe_foreign(view)
         for instance in self.instances:
             instance.step(self.population)
-        self.instances = [instance for instance in self.instances if instance.active]

@@ -137,6 +137,13 @@ def test_area_without_continuous_is_filled_once() -> None:
     assert any(place.x > 1350.0 for place in scene.placements.values())
 
 
+def test_area_that_is_stopped_before_its_first_step_remains_empty() -> None:
+    scene = Scene()
+    scene.start(Area("area", 1, 20, scene.mixture, False, lambda sites: np.ones(len(sites), dtype=bool)))
+    scene.traffic.stop("area")
+    assert [len(changes.additions) for changes in scene.run(1.0)] == [0] * 10
+
+
 def test_stopped_generators_spawn_and_remove_no_cars() -> None:
     scene = Scene(0, 2)
     source(scene, rate=1.0)
