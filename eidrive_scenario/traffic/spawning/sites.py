@@ -22,6 +22,7 @@ from eidrive_scenario.traffic.cars import PLANNED
 from eidrive_scenario.traffic.fleet import Fleet
 from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.traffic.leaders import FOREIGN, Leaders, find_followers, find_leaders
+from eidrive_scenario.traffic.occupancy import TALLEST
 from eidrive_scenario.traffic.right_of_way import STOP_LINE, TOO_LATE
 from eidrive_scenario.traffic.spawning.bodies import Participant
 
@@ -43,12 +44,13 @@ _NOBODY = -9
 
 @dataclass(frozen=True)
 class SpawnSites:
-    """Sites (K,): lane and progress, x, y [m], heading of the traffic [rad], width of the lane [m]."""
+    """Sites (K,): lane and progress, x, y, z [m], heading of the traffic [rad], width of the lane [m]."""
 
     lane: Integers
     progress: Array
     x: Array
     y: Array
+    z: Array
     heading: Array
     width: Array
 
@@ -65,7 +67,7 @@ class SpawnSites:
         """Return sites (K,) at given lanes and progress."""
         poses = lanes.tables.lane_poses(lane, lanes.s(lane, progress), np.zeros(len(lane)))
         heading = poses.h + np.where(lanes.direction[lane] > 0, 0.0, np.pi)
-        return cls(lane, progress, poses.x, poses.y, heading, lanes.width(lane, progress))
+        return cls(lane, progress, poses.x, poses.y, poses.z, heading, lanes.width(lane, progress))
 
     def __len__(self) -> int:
         return len(self.lane)
@@ -200,9 +202,10 @@ def _touches(sites: SpawnSites, n: int, participant: Participant, boxes: Array) 
     yaw = float(sites.heading[n])
     cos, sin = np.cos(yaw), np.sin(yaw)
     x, y = sites.x[n] + cos * spec.offset[0], sites.y[n] + sin * spec.offset[0]
+    z = float(sites.z[n]) + 0.5 * TALLEST
     reach = np.hypot(spec.size[0], spec.size[1]) / 2.0 + np.hypot(boxes[:, 3], boxes[:, 4]) / 2.0 + 2.0 * AIR
     for box in boxes[np.hypot(boxes[:, 0] - x, boxes[:, 1] - y) < reach].tolist():
-        mine = (float(x), float(y), box[2], spec.size[0] + 2.0 * AIR, spec.size[1] + 2.0 * AIR, box[5], yaw)
+        mine = (float(x), float(y), z, spec.size[0] + 2.0 * AIR, spec.size[1] + 2.0 * AIR, TALLEST, yaw)
         if overlap(mine, box):
             return True
     return False

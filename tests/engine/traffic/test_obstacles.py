@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fleet_scene import LENGTH, REAR_AXLE, street, view_of
+from fleet_scene import LENGTH, REAR_AXLE, car, street, view_of
 
+from eidrive_scenario.base.car_following import IntelligentDriver
+from eidrive_scenario.roads import LaneKey
+from eidrive_scenario.traffic import Fleet, Participant, SpawnSites
 from eidrive_scenario.traffic.lanes import TrafficLanes
 from eidrive_scenario.traffic.occupancy import Occupancy
+from eidrive_scenario.traffic.spawning.sites import is_unoccupied, leaders_ahead
 from eidrive_scenario.world.actor import Placement
 
 LANE = -1.75
@@ -61,6 +65,16 @@ def test_actor_above_the_tallest_vehicles_occupies_no_lane() -> None:
     views = {"low": Placement(100.0, LANE, 3.9), "high": Placement(200.0, LANE, 4.1)}
     occupancy.observe(view_of(views), frozenset())
     assert places_of(occupancy) == pytest.approx(outline(100.0))
+
+
+@pytest.mark.parametrize(("base", "is_free"), [(0.0, False), (3.9, False), (4.1, True), (-1.4, False), (-1.6, True)])
+def test_site_is_free_below_and_above_other_levels(base: float, is_free: bool) -> None:
+    """The box is 1.5 m high; vehicles are at most 4 m high (Directive 96/53/EC)."""
+    fleet, participant = Fleet(street(1, 1)), Participant(car("new"), IntelligentDriver())
+    sites = SpawnSites.at(fleet.lanes, np.array([fleet.lanes.row_of(LaneKey("1", 0, -1))]), np.array([100.0]))
+    boxes = np.array([[100.0, LANE, base + 0.75, 4.6, 1.9, 1.5, 0.0]])
+    speed, leaders = np.array([5.0]), leaders_ahead(fleet, sites, participant)
+    assert is_unoccupied(fleet, sites, participant, speed, leaders, boxes).tolist() == [is_free]
 
 
 def test_resting_actor_out_of_sight_is_ignored_until_a_car_is_near() -> None:
