@@ -15,7 +15,7 @@ from eidrive_scenario.base.car_following import Drivers, IntelligentDriver
 from eidrive_scenario.roads.routing.route import smoothstep
 from eidrive_scenario.traffic.cars import PLANNED, VAN_FRONT, Cars
 from eidrive_scenario.traffic.lanes import TrafficLanes
-from eidrive_scenario.traffic.leaders import FOREIGN, Leaders, Occupants, find_followers, find_leaders
+from eidrive_scenario.traffic.leaders import FIXED, FOREIGN, Leaders, Occupants, find_followers, find_leaders
 
 
 @dataclass(frozen=True)
@@ -134,8 +134,9 @@ class LaneChanges:
         progress, front, rear, speed = (column[indices] for column in columns)
         drivers, wish, length = cars.drivers.of_rows(indices), desired[indices], front - rear
         after = find_leaders(lanes, lanes.chain(target, PLANNED + 1), progress, front, occupants, own=indices)
-        new = find_followers(lanes, target, progress, rear, occupants, indices)
-        old = find_followers(lanes, cars.lane[indices], progress, rear, occupants, indices)
+        moving = occupants.without(FIXED)
+        new = find_followers(lanes, target, progress, rear, moving, indices)
+        old = find_followers(lanes, cars.lane[indices], progress, rear, moving, indices)
         gap, ahead = leaders.gap[indices], leaders.speed[indices]
 
         # Before and after the change in one call each, first the car, then its new and its old follower
@@ -148,7 +149,7 @@ class LaneChanges:
         number = np.concatenate([new.number, new.number, old.number, old.number])
         behind = np.concatenate([new.gap + length + after.gap, new.gap, old.gap, old.gap + length + gap])
         leader = np.concatenate([after.speed, speed, speed, ahead])
-        followers = self._followers(cars, desired, occupants, number, behind, leader)
+        followers = self._followers(cars, desired, moving, number, behind, leader)
         return Prospect(*own.reshape(2, -1), *followers.reshape(4, -1))
 
     def _followers(

@@ -132,8 +132,9 @@ def find_leaders(
 def find_followers(
     lanes: TrafficLanes, lane: Integers, progress: Array, rear: Array, occupants: Occupants, own: Integers
 ) -> Followers:
-    """Return the next moving occupant behind positions on lanes, on the lane itself and its predecessors.
+    """Return the next occupant behind positions on lanes, on the lane itself and its predecessors.
 
+    occupants      without the ends of lanes, which would hide followers before them
     lane, progress  (N,) of the reference points
     rear           (N,) distance from the reference point to the rear bumper, negative [m]
     own            (N,) indices of the requesting cars in the fleet
@@ -158,9 +159,6 @@ def find_followers(
         offset = offset[going] + lanes.length[at_lane]
         if not open_.size:
             break
-    fixed = number >= 0
-    fixed[fixed] = occupants.owner[number[fixed]] == FIXED
-    gap[fixed], number[fixed] = np.inf, -1
     return Followers(gap, number)
 
 

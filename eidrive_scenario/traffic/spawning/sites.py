@@ -21,7 +21,7 @@ from eidrive_scenario.roads.routing.links import RoadEnd
 from eidrive_scenario.traffic.cars import PLANNED
 from eidrive_scenario.traffic.fleet import Fleet
 from eidrive_scenario.traffic.lanes import TrafficLanes
-from eidrive_scenario.traffic.leaders import FOREIGN, Leaders, find_followers, find_leaders
+from eidrive_scenario.traffic.leaders import FIXED, FOREIGN, Leaders, find_followers, find_leaders
 from eidrive_scenario.traffic.occupancy import TALLEST
 from eidrive_scenario.traffic.right_of_way import STOP_LINE, TOO_LATE
 from eidrive_scenario.traffic.spawning.bodies import Participant
@@ -178,7 +178,7 @@ def is_unoccupied(
     foreign  (M, 7) boxes of all actors outside the fleet
     """
     lanes, spec, driver = fleet.lanes, participant.spec, participant.driver
-    count, occupants = len(sites), fleet.occupants()
+    count, occupants = len(sites), fleet.occupants().without(FIXED)
     rear = np.full(count, participant.front - spec.size[0])
     followers = find_followers(lanes, sites.lane, sites.progress, rear, occupants, np.full(count, _NOBODY))
     own = Drivers(np.repeat(Drivers.of([driver]).table, count, axis=0))

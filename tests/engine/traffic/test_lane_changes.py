@@ -209,6 +209,20 @@ def test_changing_car_brakes_for_standing_car_beyond_a_nearer_faster_one() -> No
 
 
 @pytest.mark.statistical
+def test_end_of_merging_lane_does_not_hide_followers_before_it() -> None:
+    """Lanes -1 and -2 merge at s = 100 m; a car of 20 m/s follows a slow one 13 m ahead in the next lane."""
+    merging = lane_xml(-1, link=lane_links_xml(after=-1)).replace('b="0"', 'b="-0.01"')
+    before = merging + lane_xml(-2, link=lane_links_xml(after=-1)) + lane_xml(-3, link=lane_links_xml(after=-2))
+    after = lane_xml(-1, link=lane_links_xml(before=-1)) + lane_xml(-2, link=lane_links_xml(before=-3))
+    lanes = section_xml(right=before) + section_xml(right=after, s=100)
+    roads = RoadNetwork.parse(map_xml(road_xml(length=300.0, lanes=lanes)))
+    fleet = Fleet(roads)
+    add_car(fleet, car("me"), roads.location("1", -2, 108.0), speed=6.0, desired_speed=13.0)
+    add_car(fleet, car("standing"), roads.location("1", -2, 130.0), desired_speed=0.01)
+    add_car(fleet, car("late"), roads.location("1", -1, 95.0), speed=20.0)
+    assert lane_after_one_step(fleet) == -2
+
+
 def test_dense_traffic_changes_lanes_without_contact() -> None:
     roads = street(right=3, length=3000.0)
     rng = np.random.default_rng(3)
