@@ -389,7 +389,7 @@ class RoadNetwork:
         on one of their lanes. A road user that crosses a junction thus remains on its connecting road.
         """
         if hint is not None and hint.road in self.roads:
-            near = locate_near(self.roads, self.movement, x, y, hint)
+            near = locate_near(self.roads, self.links, self.movement, x, y, hint)
             if near is not None:
                 return near
         heights = None if z is None else np.array([z])

@@ -144,7 +144,7 @@ class _Search:
 
 
 def locate_near(
-    roads: Mapping[str, Road], movement: Movement, x: float, y: float, hint: LaneLocation
+    roads: Mapping[str, Road], links: LaneLinks, movement: Movement, x: float, y: float, hint: LaneLocation
 ) -> LaneLocation | None:
     """Return the lane location of a point on the road of `hint` or on an adjacent one, or None if it is on neither.
 
@@ -155,9 +155,11 @@ def locate_near(
     if location is not None:
         return location
     ahead = road.driving_direction(hint.lane)
+    here = LaneKey(road.id, road.section_at(hint.s).index, hint.lane)
     for direction in (ahead, -ahead):
         last = len(road.sections) - 1 if direction > 0 else 0
-        fork = movement.fork(LaneKey(road.id, last, hint.lane), direction) if hint.lane else ()
+        lane = links.continued(here, road.id, last)
+        fork = movement.fork(LaneKey(road.id, last, lane), direction) if lane else ()
         for branch in sorted(fork, key=lambda branch: default_rank(branch.turn, road)):
             target = roads[branch.lane.road]
             adjacent = _on(target, x, y, 0.0 if branch.direction > 0 else target.length)

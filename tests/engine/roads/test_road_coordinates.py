@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from opendrive_xml import elevation_xml, lanes_xml, map_xml, road_xml
+from opendrive_xml import (
+    elevation_xml,
+    junction_xml,
+    lane_links_xml,
+    lane_xml,
+    lanes_xml,
+    map_xml,
+    predecessor_xml,
+    road_xml,
+    section_xml,
+    successor_xml,
+)
 
 from eidrive_scenario.roads import PositionError, RoadNetwork
 from eidrive_scenario.roads.model import curves
@@ -233,6 +244,32 @@ def test_locate_with_hint_stays_on_the_same_road() -> None:
         location = network.locate_at(51.0, -1.0, network.location(name, -1, s))
         assert location is not None
         assert location.road == name
+
+
+def test_locate_with_hint_follows_the_lane_into_a_junction() -> None:
+    """Lane -1 becomes -2 in the last section, which leads to road 2; road 3 overlaps it and continues the new -1."""
+    lanes = section_xml(right=lane_xml(-1, link=lane_links_xml(after=-2)))
+    lanes += section_xml(right=lane_xml(-1, 0.5) + lane_xml(-2, link=lane_links_xml(before=-1)), s=99)
+    only = section_xml(right=lane_xml(-1, 5.0))
+    before = predecessor_xml("1")
+    junction = junction_xml("J", "1", {"3": -1, "2": -2})
+    network = RoadNetwork.parse(
+        map_xml(
+            road_xml("1", lanes=lanes, link=successor_xml(junction="J")),
+            road_xml("2", length=30.0, x=100.0, y=-0.5, lanes=only, junction="J", link=before),
+            road_xml("3", length=30.0, x=100.0, curvature=0.05, lanes=only, junction="J", link=before),
+            rest=junction,
+        )
+    )
+    hint = network.location("1", -1, 98.5)
+    there = network.advance(hint, 2.0)
+    assert there is not None
+    assert there.road == "2"
+    pose = network.pose(there)
+    location = network.locate_at(pose.x, pose.y, hint)
+    assert location is not None
+    assert location.road == "2"
+    assert location.s == pytest.approx(there.s)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4])
