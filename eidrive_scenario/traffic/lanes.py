@@ -86,7 +86,8 @@ class TrafficLanes:
             if road.junction_id is not None:
                 continue
             for section in road.sections:
-                numbers = [number for number in section.lanes if number]
+                # A lane without a width separates no others.
+                numbers = [number for number, lane in section.lanes.items() if number and not lane.width.is_zero]
                 neighbors = [self.row_of(LaneKey(road.id, section.index, number)) for number in numbers]
                 for left, right in pairwise(neighbors):
                     same = self.direction[left] == self.direction[right]

@@ -107,6 +107,14 @@ def test_polite_leader_changes_lane_for_faster_follower() -> None:
         assert lane_after_one_step(fleet) == lane
 
 
+def test_car_changes_lanes_over_a_lane_of_width_0() -> None:
+    lanes = section_xml(right=lane_xml(-1) + lane_xml(-2, 0) + lane_xml(-3))
+    roads = RoadNetwork.parse(map_xml(road_xml(length=1000.0, lanes=lanes)))
+    fleet = Fleet(roads, changer=LaneChanger(bias=0.3))
+    add_car(fleet, car("me"), roads.location("1", -1, 500.0), speed=20.0, desired_speed=20.0)
+    assert lane_after_one_step(fleet) == -3
+
+
 def test_solid_marking_prevents_lane_change() -> None:
     for mark, lane in (("none", -2), ("decrease", -2), ("increase", -1)):
         assert lane_after_one_step(queue(street(mark=mark), LaneChanger(), leader_gap=100.0)) == lane
