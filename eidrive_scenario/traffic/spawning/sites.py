@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from heapq import heappop, heappush
+from itertools import count, pairwise
 
 import numpy as np
 
@@ -266,7 +266,7 @@ def road_range(roads: RoadNetwork, cursors: Sequence[Cursor], length: float | No
         if start.road == end.road:
             parts.append((Stretch(start.road, min(here, there), max(here, there), start.lanes), there >= here))
             continue
-        chain = _chain(ends, start.road, end.road)
+        chain = _chain(roads, ends, start.road, end.road)
         leaving, *between, entering = chain
         forward = leaving.side > 0
         if start.s is None and number == 0 and not forward:
@@ -307,18 +307,23 @@ def _links(roads: RoadNetwork) -> Mapping[RoadEnd, list[RoadEnd]]:
     return links
 
 
-def _chain(ends: Mapping[RoadEnd, list[RoadEnd]], start: str, goal: str) -> list[RoadEnd]:
-    """Return the road ends from the exit of `start` to the entry of `goal`; roads between have two consecutive ends."""
-    queue = deque([[RoadEnd(start, 1)], [RoadEnd(start, -1)]])
-    seen = {RoadEnd(start, 1), RoadEnd(start, -1)}
+def _chain(roads: RoadNetwork, ends: Mapping[RoadEnd, list[RoadEnd]], start: str, goal: str) -> list[RoadEnd]:
+    """Return the road ends from the exit of `start` to the entry of `goal`; roads between have two consecutive ends.
+
+    Their total length is minimal (Dijkstra's algorithm).
+    """
+    numbers = count()
+    queue = [(0.0, next(numbers), [RoadEnd(start, side)]) for side in (1, -1)]
+    seen: set[RoadEnd] = set()
     while queue:
-        chain = queue.popleft()
+        length, _, chain = heappop(queue)
+        if chain[-1] in seen:
+            continue
+        seen.add(chain[-1])
         for end in ends.get(chain[-1], ()):
             if end.road == goal:
                 return [*chain, end]
-            if end not in seen:
-                other = RoadEnd(end.road, -end.side)
-                seen |= {end, other}
-                queue.append([*chain, end, other])
+            longer = length + roads.road(end.road).length
+            heappush(queue, (longer, next(numbers), [*chain, end, RoadEnd(end.road, -end.side)]))
     message = f"no chain of roads leads from road {start!r} to road {goal!r}"
     raise PositionError(Diagnostic(message, "correct the road cursors"))

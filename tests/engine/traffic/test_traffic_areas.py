@@ -7,7 +7,16 @@ import math
 import numpy as np
 import pytest
 from fleet_scene import street
-from opendrive_xml import lane_links_xml, lane_xml, map_xml, predecessor_xml, road_xml, section_xml, successor_xml
+from opendrive_xml import (
+    junction_xml,
+    lane_links_xml,
+    lane_xml,
+    map_xml,
+    predecessor_xml,
+    road_xml,
+    section_xml,
+    successor_xml,
+)
 
 from eidrive_scenario.errors import InputError
 from eidrive_scenario.roads import RoadNetwork
@@ -98,6 +107,27 @@ def test_range_over_several_roads_follows_their_links() -> None:
         Stretch("b", 0.0, 100.0),
         Stretch("a", 60.0, 100.0),
     ]
+
+
+def test_range_follows_the_shortest_roads_not_the_fewest() -> None:
+    """Road b of 300 m and the roads d and e of 30 m lead from a to c."""
+    lanes = section_xml(right=lane_xml(-1, link=lane_links_xml(-1, -1)))
+    links = {
+        "a": successor_xml(junction="J"),
+        "b": predecessor_xml("a") + successor_xml("c"),
+        "c": predecessor_xml("b"),
+        "d": predecessor_xml("a") + successor_xml("e"),
+        "e": predecessor_xml("d") + successor_xml("c"),
+    }
+    lengths = {"a": 100.0, "b": 300.0, "c": 100.0, "d": 30.0, "e": 30.0}
+    junctions = {"b": "J", "d": "J"}
+    parts = [
+        road_xml(name, length=lengths[name], link=link, lanes=lanes, junction=junctions.get(name, "-1"))
+        for name, link in links.items()
+    ]
+    roads = RoadNetwork.parse(map_xml(*parts, rest=junction_xml("J", "a", {"b": -1, "d": -1})))
+    stretches = road_range(roads, [Cursor("a", 0.0), Cursor("c", 100.0)])
+    assert [stretch.road for stretch in stretches] == ["a", "d", "e", "c"]
 
 
 def test_range_over_unknown_or_unlinked_roads_is_an_error() -> None:
