@@ -49,6 +49,11 @@ def read_sections(
         return ()
     if any(collector.flag(element, "singleSide") for _, element in elements):
         elements = _join_sides(elements)
+    first, element = elements[0]
+    if first > 1e-6 and lanes.get("layer") != "temporary":
+        message = f"the first <laneSection> of its road begins at s = {first:g} m"
+        kind = "lane sections that begin late"
+        collector.report_warning(element, MapRule.GEOMETRY_GAP, kind, message, "start it at s=0")
     ends = [*(s for s, _ in elements[1:]), length]
     sections: list[LaneSection] = []
     left_out: list[Mapping[int, Lane]] = []

@@ -67,6 +67,11 @@ def test_length_that_differs_from_geometry_is_a_warning() -> None:
     ]
 
 
+def test_lane_section_that_begins_late_is_a_warning() -> None:
+    text = map_xml(road_xml(lanes=section(20, lane(-1))))
+    assert map_warnings(text) == [("geometry-gap", "the first <laneSection> of its road begins at s = 20 m")]
+
+
 def test_warnings_of_one_kind_are_grouped_with_their_lines() -> None:
     text = map_xml(*("\n" + road_xml(str(n), geometry=two_lines(y=1.0)) for n in range(8)))
     (diagnostic,) = RoadNetwork.parse(text, "town.xodr").map_warnings
