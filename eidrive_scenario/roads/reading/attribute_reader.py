@@ -32,9 +32,12 @@ class AttributeReader:
         self._spent: dict[str, float] = {}
 
     def report_error(self, where: etree._Element | int | None, message: str, hint: str) -> None:
-        """Append an error of an element or line. Raise RoadError with all errors if there are too many."""
+        """Append an error of an element or line, once. Raise RoadError with all errors if there are too many."""
         line = where if isinstance(where, int) else line_of(where)
-        self.errors.append(Diagnostic(message, hint, self.source, line))
+        error = Diagnostic(message, hint, self.source, line)
+        if error in self.errors:
+            return
+        self.errors.append(error)
         if len(self.errors) >= MAX_ERRORS:
             last = Diagnostic(f"reading ends after {MAX_ERRORS} errors", "", self.source, line)
             raise RoadError([*sorted(self.errors, key=lambda error: error.line or 0), last])

@@ -54,6 +54,14 @@ def test_all_errors_are_reported_with_line_and_hint() -> None:
     ]
 
 
+def test_invalid_attribute_that_is_read_several_times_is_one_error() -> None:
+    """Each repetition reads the size of the object."""
+    repeats = '<repeat s="0" length="50" distance="5"/>' * 2
+    thing = f'<object id="1" type="barrier" s="10" t="3" length="abc" height="1">{repeats}</object>'
+    (error,) = road_diagnostics(map_xml(road_xml(extra=f"<objects>{thing}</objects>")))
+    assert "length='abc'" in error
+
+
 @pytest.mark.parametrize("kind", ["junction", "controller"])
 def test_junctions_and_controllers_with_one_id_are_errors(kind: str) -> None:
     text = map_xml(road_xml(), *[f'\n<{kind} id="7" name="{name}"/>' for name in ("a", "b")])
