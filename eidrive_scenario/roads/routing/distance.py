@@ -51,7 +51,7 @@ class RoadDistances:
             ahead, left_of_a = (b.s - a.s) * direction, (b.t - a.t) * direction
             sense = 1 if ahead > 0.0 else -1
             is_shortest = 2.0 * abs(ahead) <= self._roads[a.road].length  # as the way around a closed track is longer
-            if is_shortest and only in (0, sense):
+            if is_shortest and only * ahead >= 0.0:
                 return ahead, left_of_a, 1
             if only in (0, sense):
                 options.append((abs(ahead) * self._per_meter(a.road, by), abs(ahead), sense, left_of_a, 1))

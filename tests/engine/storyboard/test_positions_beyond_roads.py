@@ -166,3 +166,4 @@ def test_distance_in_one_sense_leads_around_a_closed_track(ring: RoadNetwork, se
         ahead = 30.0 * -lane
         expected = ahead if ahead * sense > 0.0 else ahead - math.copysign(2.0 * HALF, ahead)
         assert ring.distance(a, b, sense=sense) == pytest.approx((expected, 0.0))
+        assert ring.distance(a, a, sense=sense) == pytest.approx((0.0, 0.0))
