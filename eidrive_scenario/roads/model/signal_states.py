@@ -32,6 +32,8 @@ _WORDS = {
     **{"yellow": YELLOW, "amber": YELLOW, "orange": YELLOW, "caution": YELLOW, "attention": YELLOW, "warning": YELLOW},
     **{"green": GREEN, "go": GREEN, "walk": GREEN},
 }
+_NEGATIONS = frozenset({"no", "not", "dont", "don"})
+"""Words that turn a state for going into its opposite; `don` is that of "don't"."""
 _FLASHES = frozenset({"flashing", "flash", "blinking", "blink"})
 
 
@@ -85,6 +87,8 @@ def _named(state: str) -> dict[str, str]:
             continue
         flashes = not _FLASHES.isdisjoint(words)
         colors: Sequence[str] = [_WORDS[word] for word in words if word in _WORDS]
+        if not _NEGATIONS.isdisjoint(words):
+            colors = [RED] if GREEN in colors else []
         for color in colors or ([YELLOW] if flashes else []):
             modes[color] = FLASHING if flashes else ON
     return modes

@@ -18,6 +18,7 @@ GREEN, RED = (("red", "off"), ("yellow", "off"), ("green", "on")), (("red", "on"
         ("green solidOn circle, red solidOff circle", GREEN),
         ("go", GREEN),
         ("stop", RED),
+        *((state, RED) for state in ("dontWalk", "DONT_WALK", "don't walk", "noGo", "do not go")),
         ("redYellow", (("red", "on"), ("yellow", "on"), ("green", "off"))),
         ("stop_attention", (("red", "on"), ("yellow", "on"), ("green", "off"))),
         ("flashing", (("red", "off"), ("yellow", "flashing"), ("green", "off"))),
