@@ -1,6 +1,6 @@
 """Steps along lanes of constant t, the form of most lanes.
 
-The equations are those of `Movement.advance` and `pose_in_lane` without the terms that are zero there, in the same
+The equations are those of `Movement.travel` and `pose_in_lane` without the terms that are zero there, in the same
 order, so that both give the same bits.
 """
 
