@@ -131,8 +131,7 @@ class TrafficMix:
     def categories(self) -> frozenset[str]:
         """Categories of all bodies that can be drawn."""
         if self._groups is None:
-            pairs = zip(self._categories.choices, self._categories.weights, strict=True)
-            similar = [SHAPE_BY_CATEGORY[category.value] for category, weight in pairs if weight > 0.0]
+            similar = [SHAPE_BY_CATEGORY[category.value] for category in self._categories.choices]
             return frozenset(body.category for category in similar for body, _ in library_bodies(category))
         return frozenset(member.spec.category for group in self._groups.choices for member in group.choices)
 
@@ -174,7 +173,8 @@ class TrafficMix:
         if min(weights) < 0.0 or not sum(weights) > 0.0:
             message = f"the weights {', '.join(f'{weight:g}' for weight in weights)} are invalid"
             raise ScenarioError(Diagnostic.at(entries[0], message, "give weights of at least 0, not all 0"))
-        return WeightedChoice(choices, weights)
+        pairs = [(choice, weight) for choice, weight in zip(choices, weights, strict=True) if weight > 0.0]
+        return WeightedChoice(*zip(*pairs, strict=True))
 
 
 def _participant(spec: ActorSpec, settings: DriverSettings) -> Participant:

@@ -161,6 +161,15 @@ def mix_of(scenario: Scenario) -> Counter[str]:
     return Counter(mix.draw(generator(1, "mix", number)).spec.name for number in range(400))
 
 
+def test_kinds_of_traffic_with_weight_0_are_not_in_its_categories() -> None:
+    parts = "".join(
+        KIND.format(weight=weight, name=name, vehicle=vehicle_xml(name, name), declarations="")
+        for name, weight in (("car", 1), ("bus", 0))
+    )
+    scenario = load(init=SWARM.format(parts=parts))
+    assert TrafficMix(scenario, None, only(scenario, model.TrafficDistribution)).categories == {"car"}
+
+
 def test_kinds_of_traffic_of_a_catalog(tmp_path: Path) -> None:
     """Cars and trucks of a catalog with weights 1 and 3, the latter by an assignment, and vans with weight 4."""
     catalogs = write_kinds(tmp_path)
