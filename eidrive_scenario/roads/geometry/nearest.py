@@ -28,14 +28,6 @@ _ROUNDED = 1e-12
 """Relative difference of squared distances [m²] that the tree may round to the same one."""
 _BLOCK_SIZE = 1 << 18
 """Maximum number of distances that are computed at once."""
-_PER_PIVOT = 8
-"""Number of consecutive points that one pivot represents."""
-_GROUP_SIZE = 32
-"""Maximum number of positions that share the candidates for their nearest points."""
-_MANY = 1 << 13
-"""Minimum number of distances for which the pivots select candidates first."""
-_ROUNDING = 1e-6
-"""Margin for rounding errors of distances to pivots [m]."""
 
 
 class NearestPoints:
@@ -60,18 +52,10 @@ class NearestPoints:
             distance, index = self._by_tree(to, 1, within)
             return distance[:, 0], index[:, 0]
         distance, index = np.empty(len(to)), np.empty(len(to), dtype=np.int64)
-        for start in range(0, len(to), _GROUP_SIZE):
-            group = to[start : start + _GROUP_SIZE]
-            if len(group) * len(self.points) < _MANY:
-                squares = _squares(group, self._columns)
-                nearest = chosen = squares.argmin(axis=1)
-            else:
-                candidates = self._candidates(group)
-                squares = _squares(group, self._columns.take(candidates, axis=1))
-                chosen = squares.argmin(axis=1)
-                nearest = candidates[chosen]
-            index[start : start + _GROUP_SIZE] = nearest
-            distance[start : start + _GROUP_SIZE] = np.sqrt(squares[np.arange(len(group)), chosen])
+        for block in self._blocks(len(to)):
+            squares = _squares(to[block], self._columns)
+            index[block] = squares.argmin(axis=1)
+            distance[block] = np.sqrt(squares[np.arange(len(squares)), index[block]])
         far = ~(distance < within)
         distance[far], index[far] = np.inf, len(self.points)
         return distance, index
@@ -138,24 +122,6 @@ class NearestPoints:
     def _blocks(self, count: int) -> list[slice]:
         step = max(_BLOCK_SIZE // len(self.points), 1)
         return [slice(start, start + step) for start in range(0, count, step)]
-
-    @cached_property
-    def _pivots(self) -> tuple[Array, Array]:
-        """Columns (D, P) of the pivots, and the maximum distances (P,) from them to the points they represent [m]."""
-        starts = np.arange(0, len(self.points), _PER_PIVOT)
-        pivots = np.minimum(starts + _PER_PIVOT // 2, len(self.points) - 1)
-        offsets = self._columns - self._columns[:, pivots.repeat(_PER_PIVOT)[: len(self.points)]]
-        return self._columns[:, pivots], np.maximum.reduceat(np.sqrt((offsets * offsets).sum(axis=0)), starts)
-
-    def _candidates(self, to: Array) -> Integers:
-        """Return the indices, in ascending order, of points that can be the nearest one of any of points (M, D)."""
-        pivots, radius = self._pivots
-        gap = np.sqrt(_squares(to, pivots))
-        # The nearest point is not farther than the nearest pivot.
-        limit = gap.min(axis=1) * (1.0 + 1e-9) + _ROUNDING
-        excluded = (gap - radius > limit[:, None]).all(axis=0)
-        candidates: Integers = (~excluded).repeat(_PER_PIVOT)[: len(self.points)].nonzero()[0]
-        return candidates
 
 
 def _in_order(index: Integers, squares: Array) -> tuple[Array, Integers]:

@@ -50,7 +50,7 @@ def test_nearest_points_of_no_point_are_empty() -> None:
 
 
 @pytest.mark.parametrize("dimensions", [2, 3])
-def test_nearest_points_with_pivots_equal_comparison_with_all(dimensions: int) -> None:
+def test_nearest_points_of_several_blocks_equal_comparison_with_all(dimensions: int) -> None:
     generator = np.random.default_rng(dimensions)
     way = np.cumsum(generator.uniform(-1.0, 1.0, (FEW, dimensions)), axis=0)
     points = np.concatenate([way, np.round(way), np.round(way)])[::3]
