@@ -145,7 +145,7 @@ def _outlines(lanes: TrafficLanes, view: WorldView, rows: list[int]) -> tuple[Oc
     in_the_way = base - lanes.tables.lane_poses(lane, s, np.zeros(len(lane))).z < TALLEST
     lane, s, point = lane[in_the_way], s[in_the_way], point[in_the_way]
     progress = lanes.progress(lane, s)
-    heading = lanes.tables.curves.heading(lanes.road[lane], s)
+    heading = lanes.tables.curves.at(lanes.road[lane], s)[2]
     vx, vy = view.velocity[rows, :2].T.take(point // len(OUTLINE), axis=1)
     speed = np.maximum((vx * np.cos(heading) + vy * np.sin(heading)) * lanes.direction[lane], 0.0)
     moving = np.hypot(vx, vy) > STANDING

@@ -128,7 +128,7 @@ class Locator:
     def _located(self, samples: NearestPoints, points: Array, nearest: Integers, reach: float) -> LaneLocations:
         """Return locations of points (N, 2), or (N, 3) with heights, by the nearest samples of `samples`."""
         road, s, t, row, outside, _ = self._best_roads(samples, points, nearest, np.inf)
-        heading = self._tables.curves.heading(road, s)
+        heading = self._tables.curves.at(road, s)[2]
         far = outside > reach
         center, _ = self._tables.lane_t(row, s)
         return LaneLocations(

@@ -205,7 +205,7 @@ class RoadTables:
         """Return the path length per meter of s along the center lines of lanes in plan view."""
         t, slope = self.lane_t(row, s)
         road = self.section_road[self.lane_section[row]]
-        curvature, speed = self.curves.bend(road, s)
+        *_, curvature, speed = self.curves.at(road, s)
         return np.asarray(np.maximum(np.hypot(speed * (1.0 - curvature * t), slope), LEAST_STRETCH))
 
     def lane_t(self, row: Integers, s: Array) -> tuple[Array, Array]:

@@ -65,33 +65,6 @@ class CurveTable:
                     u[some], v[some], turn[some], curvature[some], speed[some] = evaluate(curve[some], ds[some])
         return x + cos * u - sin * v, y + sin * u + cos * v, h + turn, curvature, speed
 
-    def heading(self, line: Integers, s: Array) -> Array:
-        """Return the heading at s (N,) of lines (N,) [rad], as `at` does."""
-        curve = self._curve(line, s)
-        start, curvature, _, _, h, _, _, _ = self._placing.take(curve, axis=0).T
-        ds = s - start
-        turn = curvature * ds
-        if self._evaluations:
-            kind = self._kind.take(curve)
-            some = (kind == 1).nonzero()[0]
-            if some.size:
-                k, rate, on = self._curvature[curve[some]], self._rate[curve[some]], ds[some]
-                turn[some] = on * (k + 0.5 * rate * on)
-            some = (kind == 2).nonzero()[0]
-            if some.size:
-                turn[some] = self._cubics(curve[some], ds[some])[2]
-        return np.asarray(h + turn)
-
-    def bend(self, line: Integers, s: Array) -> tuple[Array, Array]:
-        """Return the curvature and path length per meter of s at s (N,) of lines (N,), as `at` does."""
-        curve = self._curve(line, s)
-        ds = s - self._starts.take(curve)
-        curvature, speed = self._curvature[curve] + self._rate[curve] * ds, np.ones_like(ds)
-        mask = self._kind[curve] == 2
-        if mask.any():
-            _, _, _, curvature[mask], speed[mask] = self._cubics(curve[mask], ds[mask])
-        return curvature, speed
-
     def _curve(self, line: Integers, s: Array) -> Integers:
         """Return the indices of the curves at s (N,) of lines (N,)."""
         curve: Integers = self._borders.searchsorted(self.base.take(line) + s, side="right")

@@ -116,7 +116,6 @@ def test_curve_table_equals_single_lines() -> None:
     s = np.concatenate([np.linspace(0, 55, 12), np.linspace(0, 12.5, 6), [0.0, 3.0, 7.0]])
     found = np.column_stack(table.at(index, s))
     assert found == pytest.approx(np.array([lines[i].at(v) for i, v in zip(index, s, strict=True)]), abs=1e-12)
-    assert np.column_stack(table.bend(index, s)) == pytest.approx(found[:, 3:], abs=1e-12)
 
 
 def test_curve_table_of_mixed_curves_is_independent_of_other_points() -> None:
@@ -126,7 +125,6 @@ def test_curve_table_of_mixed_curves_is_independent_of_other_points() -> None:
     table = CurveTable([ReferenceLine([*mixed, turning, bent], 190.0), ReferenceLine([mixed[0]], 50.0)])
     line = np.repeat([0, 1], 200)
     s = np.concatenate([np.linspace(0.0, 190.0, 200), np.linspace(0.0, 50.0, 200)])
-    together, heading = np.array(table.at(line, s)), table.heading(line, s)
+    together = np.array(table.at(line, s))
     for n in range(len(s)):
         np.testing.assert_array_equal(np.array(table.at(line[[n]], s[[n]]))[:, 0], together[:, n])
-    np.testing.assert_array_equal(heading, together[2])
