@@ -233,20 +233,6 @@ def spiral(
     return Spiral(s, x, y, h, length, start, rate, line=line)
 
 
-def poly3(
-    s: float, x: float, y: float, h: float, length: float, v: Coefficients, line: int | None = None
-) -> list[Cubic]:
-    """Return the curve v(u) = a + b·u + c·u² + d·u³ from u = 0 over its arc length, as cubics over arc length."""
-    return _over_arc_length(Cubic(s, x, y, h, length, v=v, line=line), length, length)
-
-
-def param_poly3(
-    s: float, x: float, y: float, h: float, length: float, u: Coefficients, v: Coefficients, line: int | None = None
-) -> list[Cubic]:
-    """Return the curve u(p), v(p) for p from 0 to 1 as cubics over arc length, which is scaled to `length` [m]."""
-    return _over_arc_length(Cubic(s, x, y, h, length, u, v, line=line), 1.0)
-
-
 @cache
 def _quadrature() -> tuple[Array, Array]:
     """Return nodes and weights of the Gauss-Legendre quadrature with five points."""
@@ -254,7 +240,7 @@ def _quadrature() -> tuple[Array, Array]:
     return nodes, weights
 
 
-def _over_arc_length(curve: Cubic, end: float, arc_length: float | None = None) -> list[Cubic]:
+def over_arc_length(curve: Cubic, end: float, arc_length: float | None = None) -> list[Cubic]:
     """Return a curve u(p), v(p) as cubics over s, which is proportional to the arc length.
 
     The arc length is integrated by Gauss-Legendre quadrature. Each cubic has the points and tangents of the curve at

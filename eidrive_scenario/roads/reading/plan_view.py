@@ -98,13 +98,12 @@ def _read_cubic(
 ) -> Sequence[Curve]:
     """Return a <poly3> or <paramPoly3>. A curve that leads too far away is reported and not converted."""
     s, x, y, h, length = start
-    line = line_of(geometry)
     if shape.tag == "poly3":
         a, b, c, d = (collector.number(shape, name) for name in "abcd")
         u, v, span = (0.0, 1.0, 0.0, 0.0), (a, b, c, d), "u"
     else:
         u, v, span = _read_param_poly3(shape, collector)
-    cubic = Cubic(s, x, y, h, length, u, v, line=line)
+    cubic = Cubic(s, x, y, h, length, u, v, line=line_of(geometry))
     end = 1.0 if span == "normalized" else length
     away = max(math.hypot(point.x - x, point.y - y) for point in (cubic.at(share * end) for share in _SHARES))
     if not away <= MAX_SHAPE:
@@ -118,10 +117,7 @@ def _read_cubic(
         collector.report_warning(geometry, MapRule.GEOMETRY_GAP, "curves of another length", message, hint)
     if span == "arcLength" or collector.has_spent(CUBICS, MAX_CUBICS):
         return [cubic]
-    if span == "normalized":
-        converted = curves.param_poly3(s, x, y, h, length, u, v, line)
-    else:
-        converted = curves.poly3(s, x, y, h, length, v, line)
+    converted = curves.over_arc_length(cubic, end, length if span == "u" else None)
     collector.spend(geometry, CUBICS, len(converted), MAX_CUBICS)
     return converted
 

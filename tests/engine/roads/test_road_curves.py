@@ -74,7 +74,7 @@ def test_normalized_param_poly3_is_parametrized_by_arc_length(share: float) -> N
         return float(quad(lambda value: math.hypot(du(value), dv(value)), 0.0, p)[0])
 
     length = arc_length(1.0)
-    line = ReferenceLine(curves.param_poly3(0.0, 1.0, 2.0, 0.0, length, of_u, of_v), length)
+    line = ReferenceLine(curves.over_arc_length(Cubic(0.0, 1.0, 2.0, 0.0, length, of_u, of_v), 1.0), length)
     p = brentq(lambda value: arc_length(value) - share * length, 0.0, 1.0)
     x, y, h, curvature, speed = line.at(share * length)
     bend = (du(p) * dv.deriv()(p) - dv(p) * du.deriv()(p)) / math.hypot(du(p), dv(p)) ** 3
@@ -85,7 +85,8 @@ def test_normalized_param_poly3_is_parametrized_by_arc_length(share: float) -> N
 def test_poly3_is_parametrized_by_arc_length() -> None:
     a, b, c, d = 0.0, 0.1, 0.02, -0.0004
     length = 40.0
-    line = ReferenceLine(curves.poly3(0.0, 0.0, 0.0, 0.0, length, (a, b, c, d)), length)
+    cubic = Cubic(0.0, 0.0, 0.0, 0.0, length, v=(a, b, c, d))
+    line = ReferenceLine(curves.over_arc_length(cubic, length, length), length)
 
     def speed(u: float) -> float:
         return math.hypot(1.0, b + 2 * c * u + 3 * d * u * u)
@@ -99,6 +100,7 @@ def test_poly3_is_parametrized_by_arc_length() -> None:
 
 
 def test_curve_table_equals_single_lines() -> None:
+    cubic = Cubic(0.0, 5.0, 5.0, 1.0, 12.5, v=(0.0, 0.0, 0.01, 0.001))
     lines = [
         ReferenceLine(
             [
@@ -108,7 +110,7 @@ def test_curve_table_equals_single_lines() -> None:
             ],
             55.0,
         ),
-        ReferenceLine(curves.poly3(0.0, 5.0, 5.0, 1.0, 12.5, (0.0, 0.0, 0.01, 0.001)), 12.5),
+        ReferenceLine(curves.over_arc_length(cubic, 12.5, 12.5), 12.5),
         ReferenceLine([Arc(0.0, -3.0, 0.0, 3.0, 7.0, 0.2)], 7.0),
     ]
     table = CurveTable(lines)
