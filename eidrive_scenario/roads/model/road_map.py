@@ -97,10 +97,6 @@ class Header(msgspec.Struct, frozen=True):
     offset              origin of the file in the plane of the projection: x, y, z [m] and rotation [rad]
     """
 
-    name: str = ""
-    revision: tuple[int, int] = (1, 4)
-    vendor: str = ""
-    date: str = ""
     geo_reference: str = ""
     geo_reference_line: int | None = None
     offset: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
@@ -121,7 +117,6 @@ class RoadMark(msgspec.Struct, frozen=True):
 
     s_offset: float
     type: str
-    weight: str
     color: str
     width: float
     lane_change: str
@@ -152,7 +147,6 @@ class Lane:
     center: Polynomials
     predecessors: tuple[int, ...] = ()
     successors: tuple[int, ...] = ()
-    level: bool = False
     direction: str = "standard"
     road_marks: tuple[RoadMark, ...] = ()
     heights: tuple[LaneHeight, ...] = ()

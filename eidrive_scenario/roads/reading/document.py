@@ -92,16 +92,9 @@ def _read_header(root: etree._Element, collector: AttributeReader) -> Header:
     header = root.find("header")
     if header is None:
         return Header()
-    revision = tuple(
-        int(text[:9]) if text.isdecimal() else 0 for text in (header.get("revMajor", "1"), header.get("revMinor", "4"))
-    )
     reference, offset = header.find("geoReference"), header.find("offset")
     x, y, z, turn = (0.0 if offset is None else collector.number(offset, name, 0.0) for name in ("x", "y", "z", "hdg"))
     return Header(
-        name=header.get("name", ""),
-        revision=cast(tuple[int, int], revision),
-        vendor=header.get("vendor", ""),
-        date=header.get("date", ""),
         geo_reference=((reference.text if reference is not None else None) or "").strip(),
         geo_reference_line=line_of(reference) if reference is not None else None,
         offset=(x, y, z, turn),

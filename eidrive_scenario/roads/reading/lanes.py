@@ -192,7 +192,6 @@ def _lane(
         center=center,
         predecessors=_linked(link, "predecessor", collector),
         successors=_linked(link, "successor", collector),
-        level=collector.flag(element, "level"),
         direction=element.get("direction", "standard"),
         road_marks=tuple(sorted(_read_marks(element, begin, collector), key=lambda mark: mark.s_offset)),
         heights=tuple(
@@ -237,8 +236,8 @@ def _read_height(element: etree._Element, begin: float, collector: AttributeRead
 
 def _read_marks(element: etree._Element, begin: float, collector: AttributeReader) -> Iterable[RoadMark]:
     for mark in element.iterfind("roadMark"):
-        weight = mark.get("weight", "standard")
-        width = collector.mark_number(mark, "width", None) or MARK_WIDTHS.get(weight, 0.12)
+        usual = MARK_WIDTHS.get(mark.get("weight", "standard"), 0.12)
+        width = collector.mark_number(mark, "width", None) or usual
         lines = [_read_line(line, width, collector) for line in mark.iterfind("type/line")]
         lines += [_read_line(line, width, collector, ("length",)) for line in mark.iterfind("explicit/line")]
         if mark.get("type") is None:
@@ -246,7 +245,6 @@ def _read_marks(element: etree._Element, begin: float, collector: AttributeReade
         yield RoadMark(
             s_offset=(collector.mark_number(mark, "sOffset", 0.0) or 0.0) + begin,
             type=mark.get("type", "none"),
-            weight=weight,
             color=mark.get("color", "standard"),
             width=width,
             lane_change=mark.get("laneChange", "both"),
