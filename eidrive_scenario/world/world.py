@@ -162,7 +162,6 @@ class World:
             return
         self._contacts.find_added(self._bodies)
         self._update_attributes()
-        order = list(self._bodies)
         placement = Placement(body.x, body.y, body.z, body.yaw, body.pitch, body.roll, body.speed)
         body.remove()
         acceleration, yaw_rate, velocity = body.acceleration, body.yaw_rate, body.velocity
@@ -170,8 +169,6 @@ class World:
         self._enter(body.spec, placement, driven)
         entered = self._bodies[name]
         entered.acceleration, entered.yaw_rate, entered.velocity = acceleration, yaw_rate, velocity
-        self._bodies = {key: self._bodies[key] for key in order}
-        self._changed()
 
     def set_trailers(self, pairs: Collection[frozenset[str]]) -> None:
         """Set the pairs of a vehicle and its trailer, which may overlap; actors may be absent."""
