@@ -163,8 +163,7 @@ class RoadNetwork:
 
     def driving_direction(self, road_id: str, lane_id: int) -> int:
         """Return +1 if traffic of the lane drives in the direction of s, else -1."""
-        road = self.roads.get(road_id) or self.road(road_id)
-        return road.directions.get(lane_id) or road.driving_direction(lane_id)
+        return self.road(road_id).driving_direction(lane_id)
 
     def lane_ids(self, road_id: str, s: float, *, drivable: bool = False) -> tuple[int, ...]:
         """Return the lane ids at s from left to right, without lane 0. With `drivable`, return only lanes for cars."""
