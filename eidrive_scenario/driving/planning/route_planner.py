@@ -216,7 +216,6 @@ class RoutePlanner(Planner):
         return self._path
 
     def _build_path(self, ego: EgoState, path: Array | None, waypoints: Array | None, lap: Array | None) -> PlannedPath:
-        (x, y, _), yaw = ego.position.tolist(), ego.yaw
         line: Array | None = None
         if path is not None and len(path) > 1:
             _check_length(path)
@@ -224,15 +223,16 @@ class RoutePlanner(Planner):
                 return _with_laps(path, lap)
             line = path[:, :2]
         elif waypoints is not None and len(waypoints):
+            x, y, _ = ego.position.tolist()
             _check_length(np.vstack([[x, y, 0.0], waypoints]))
             line = self._by_road(ego, waypoints)
-            line = _curve(x, y, yaw, waypoints) if line is None else line
+            line = _curve(x, y, ego.yaw, waypoints) if line is None else line
         if line is None:
             return self._lane_ahead(ego)
         try:
             return PlannedPath(line, ends=True)
         except ValueError:  # The destination is at the vehicle
-            return PlannedPath(np.array([[x - math.cos(yaw), y - math.sin(yaw)], [x, y]]), ends=True)
+            return _path_to(ego)
 
     def _by_road(self, ego: EgoState, waypoints: Array) -> Array | None:
         """Return the route through all waypoints; None if one of them or the vehicle is outside the road."""
@@ -261,7 +261,9 @@ class RoutePlanner(Planner):
                     more, self._sense = _further_against(self.roads, self._lane[-1])
                 self._lane += more
                 onward = bool(more)
-            if len(self._lane) > 1:
+            if len(self._lane) == 1:  # Within the last meter of the road
+                return _path_to(ego)
+            if self._lane:
                 return PlannedPath(self.roads.centers(self._lane), ends=not onward)
         reach = np.array([[0.0], [float(LOOK_AHEAD)]])
         yaw = ego.yaw
@@ -325,6 +327,12 @@ def _further_against(roads: RoadNetwork, location: LaneLocation) -> tuple[list[L
     if against and not roads.lane(there).is_two_way:
         return _lane_of_direction(roads, there, direction), 1
     return [there], -1 if against else 1
+
+
+def _path_to(ego: EgoState) -> PlannedPath:
+    """Return the path of a vehicle that stops where it is."""
+    here, ahead = ego.position[:2], np.array([math.cos(ego.yaw), math.sin(ego.yaw)])
+    return PlannedPath(np.array([here - ahead, here]), ends=True)
 
 
 def _with_laps(line: Array, lap: Array) -> PlannedPath:

@@ -133,6 +133,12 @@ def test_route_without_goal_follows_lane_to_end_of_road(car: ActorSpec, roads: R
     assert distance_from_lane(path.points).max() < 0.06
 
 
+def test_vehicle_within_last_meter_of_road_plans_to_stop(car: ActorSpec) -> None:
+    roads = RoadNetwork.parse(map_xml(road_xml(length=100.0, lanes=section_xml(right=lane_xml(-1, 3.5)))))
+    plan = planner(car, roads, target_speed=10.0).plan(ego(99.5, -1.75), NOTHING, None, 0.0)
+    assert (plan.points[-1][0] <= 100.0, plan.speeds[-1]) == (True, 0.0)
+
+
 @pytest.mark.parametrize("radius", [3.5, 6.0, 20.0])
 def test_route_on_ring_road_does_not_end(car: ActorSpec, radius: float) -> None:
     length = 2.0 * math.pi * radius

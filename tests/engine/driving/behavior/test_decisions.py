@@ -262,7 +262,7 @@ def test_places_move_by_the_way_driven_when_laps_are_added(monkeypatch: pytest.M
     assert third == pytest.approx(-speed * (third_time - second_time), abs=2.0)
 
 
-@pytest.mark.parametrize("start", [50.0, 58.0])
+@pytest.mark.parametrize("start", [50.0, 58.0, 59.5])
 def test_vehicle_that_passes_the_end_of_the_road_stops_there(start: float) -> None:
     roads = two_lane_road(60.0)
     drive = PlannedDrive(behavior(roads, 11.0), roads, speed=11.0, start=start)
