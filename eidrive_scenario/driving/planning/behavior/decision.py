@@ -191,8 +191,8 @@ class Decider:
         self._challenger: tuple[str, float] = (ROUTE, math.inf)
         """Another maneuver than the current one that has been best, and the time since when [s]."""
         self._time_gap = TimeGap(settings)
-        self._oncoming = OncomingTraffic(view[0], times, body, settings)
-        self._view_behind = view[1]
+        self._view = view
+        self._oncoming = self._opposite()
         self._behind = self._neighbors()
         """Traffic in the lanes to the left (1) and to the right (-1) of the line."""
         self._walking_pace = WalkingPace(settings, len(times))
@@ -202,8 +202,11 @@ class Decider:
         self._braking = 0.0
         """Deceleration of emergency braking if that was the last decision [m/s²], else 0."""
 
+    def _opposite(self) -> OncomingTraffic:
+        return OncomingTraffic(self._view[0], self._times, self._body, self._settings)
+
     def _neighbors(self) -> dict[int, TrafficBehind]:
-        return {side: TrafficBehind(self._view_behind, self._body, self._settings) for side in (1, -1)}
+        return {side: TrafficBehind(self._view[1], self._body, self._settings) for side in (1, -1)}
 
     def line_changed(self, shift: float | None, aside: float) -> None:
         """Move the current maneuver to another line.
@@ -211,7 +214,10 @@ class Decider:
         shift  increase of the distances along the line [m]; None if the maneuver ends because the lines differ
         aside  distance of the new line to the left of the one before [m], if the vehicle has changed to its lane
         """
-        self._oncoming.line_changed(None if aside else shift)
+        if shift is None and not aside:
+            self._oncoming = self._opposite()
+        else:
+            self._oncoming.line_changed(None if aside else shift)
         if aside or shift is None:
             self._behind = self._neighbors()
         current = self._current

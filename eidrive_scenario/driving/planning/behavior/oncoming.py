@@ -202,7 +202,10 @@ class OncomingTraffic:
         return now - max(self._last, now if self._held_up_since is None else self._held_up_since)
 
     def line_changed(self, shift: float | None) -> None:
-        """Move what is known to be free to another line, or forget it; `shift` as for `Decider.line_changed`."""
+        """Move what is known to be free to another line of the road, or forget it; traffic is that of the road.
+
+        shift  increase of the distances along the line [m]; None if the vehicle has changed to a neighboring lane
+        """
         self._free_to = -math.inf if shift is None else self._free_to + shift
         self._others_yield &= shift is not None
 

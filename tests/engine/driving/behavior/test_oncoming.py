@@ -7,7 +7,9 @@ import math
 import numpy as np
 import pytest
 from opendrive_xml import lane_xml, map_xml, road_xml, section_xml
+from signal_street import CAR
 
+from eidrive_scenario.driving.planning.behavior.decision import Decider
 from eidrive_scenario.driving.planning.behavior.oncoming import (
     PAUSE,
     Motion,
@@ -114,6 +116,18 @@ def test_hidden_traffic_drives_at_the_limit_until_the_vehicle_has_waited() -> No
     waiting.observe(scene((30.0, 3.5, -8.0)), 0.0, 10.0, 4.0, held_up=True)
     assert waiting.hidden_speed(BESIDE, PAUSE + 1.0) == 15.0, "traffic in view restarts the time"
     assert waiting.hidden_speed(BESIDE, PAUSE + 4.0) == 8.0, "as fast as the traffic in view was"
+
+
+@pytest.mark.parametrize(("shift", "aside", "speed"), [(None, 0.0, 15.0), (None, 3.5, 25.0), (4.0, 0.0, 25.0)])
+def test_traffic_of_another_line_is_forgotten_but_not_of_the_road(
+    shift: float | None, aside: float, speed: float
+) -> None:
+    """A car of 25 m/s came before; the limit is 15 m/s."""
+    decider = Decider(SETTINGS, CAR, BODY, TIMES, (80.0, 80.0))
+    decider._oncoming.observe(scene((30.0, 3.5, -25.0)), 0.0, 10.0, 0.0, held_up=False)
+    decider.line_changed(shift, aside)
+    decider._oncoming.observe(scene(), 0.0, 10.0, 0.1, held_up=False)
+    assert decider._oncoming.hidden_speed(BESIDE, 0.1) == speed
 
 
 def test_traffic_beside_three_lanes_of_the_own_direction_restarts_the_pause() -> None:
