@@ -244,8 +244,7 @@ class Decider:
             profiles.append(early)
         beside = situation.lanes_ahead
         for side, lane in ((1, beside.left), (-1, beside.right)):
-            if not math.isnan(lane):
-                self._behind[side].observe(scene, lane, situation.now)
+            self._behind[side].observe(scene, lane, situation.now)
         change = situation.change
         merges = change is not None and current.name == change.name
         self._time_gap.update(scene, (situation.s, situation.d), self._body, merges=merges)

@@ -155,14 +155,19 @@ class TrafficBehind:
         self._gap = view - body.rear
         self._relative = REAR_RESPONSE + settings.acceleration
         """Deceleration of traffic behind relative to the vehicle, which accelerates meanwhile [m/s²]."""
+        self._is_observed = False
+        """Whether there was a lane in the last decision."""
         self._fastest = 0.0
         self._last = -math.inf
-        """Time of the last traffic, or of the first observation [s]."""
+        """Time of the last traffic, or since when the lane is observed [s]."""
 
     def observe(self, scene: Surroundings, lane: float, now: float) -> None:
-        """Update by the objects in the lane whose center is at an offset [m] at `now` [s]."""
-        if math.isinf(self._last):
-            self._last = now
+        """Update by the objects in the lane whose center is at an offset [m], nan without a lane, at `now` [s]."""
+        was_observed, self._is_observed = self._is_observed, not math.isnan(lane)
+        if not self._is_observed:
+            return
+        if not was_observed:
+            self._fastest, self._last = 0.0, now
         speeds = scene.speed[in_lane(scene, lane)[:, 0], 0]
         fastest = float(speeds.max(initial=0.0))
         if fastest > STILL:

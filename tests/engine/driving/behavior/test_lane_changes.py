@@ -15,7 +15,12 @@ from signal_street import CAR
 from eidrive_scenario.base.coverage import ViewSector
 from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.planning.behavior.lane_changes import route_lanes
+from eidrive_scenario.driving.planning.behavior.merging import TrafficBehind
+from eidrive_scenario.driving.planning.behavior.prediction import Predictor
+from eidrive_scenario.driving.planning.behavior.proposals import Body
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
+from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, surroundings
 from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.roads import RoadNetwork
 
@@ -52,6 +57,13 @@ def drive(
     run.run(seconds, traffic, goal=Goal(waypoints=np.array([[*end, 0.0]])))
     run.world.close()
     return run
+
+
+def without_objects() -> Surroundings:
+    """Return the surroundings of a vehicle at x = 0 on a straight line without objects."""
+    line = ReferenceLine(PlannedPath(np.array([[0.0, 0.0], [100.0, 0.0]]), ends=False), None)
+    prediction = Predictor(None, np.arange(0.0, 8.01, 0.25)).predict([])
+    return surroundings([], prediction, line, (0, 100), BehaviorSettings(), (0.0, 0.0, 2.25, 0.9), None)
 
 
 def clearance(run: PlannedDrive, traffic: Traffic) -> float:
@@ -234,6 +246,16 @@ def test_moving_car_is_not_overtaken_on_the_right() -> None:
     run.world.close()
     assert max(abs(y - LANE) for _, y, _ in run.path) < 0.2
     assert run.speeds[-1] == pytest.approx(8.0, abs=0.3)
+
+
+def test_lane_that_begins_anew_is_observed_before_it_counts_as_quiet() -> None:
+    """A car of 19 m/s needs 3 m + 19 m + 19² m / 9 to slow down for a standing vehicle; the view is 25 m."""
+    behind, scene = TrafficBehind(25.0, Body.of(CAR), BehaviorSettings()), without_objects()
+    gaps = []
+    for now, lane in ((0.0, WIDTH), (12.5, WIDTH), (13.0, math.nan), (30.0, WIDTH), (42.5, WIDTH)):
+        behind.observe(scene, lane, now)
+        gaps.append(behind.leaves_gap(19.0, 0.0, now))
+    assert gaps == [False, True, True, False, True], "12 s without traffic are quiet"
 
 
 def fast_traffic_after(quiet: float, view: float) -> tuple[list[float], PlannedDrive]:
