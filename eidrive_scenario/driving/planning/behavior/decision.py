@@ -247,7 +247,7 @@ class Decider:
             self._behind[side].observe(scene, lane, situation.now)
         change = situation.change
         merges = change is not None and current.name == change.name
-        self._time_gap.update(scene, (situation.s, situation.d), self._body, merges=merges)
+        self._time_gap.update(scene, (situation.s, situation.d), self._body, situation.now, merges=merges)
         if change is not None and merges:
             scene = with_followers(scene, change.offset, situation.motion, self._body)
         elif change is not None and (motion := self._required_change(situation, scene, change)) is not None:

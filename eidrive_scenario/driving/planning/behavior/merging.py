@@ -195,12 +195,16 @@ class TimeGap:
 
     def __init__(self, settings: BehaviorSettings) -> None:
         self._usual = settings.time_gap
-        self._period = settings.period
+        self._updated = math.inf
+        """Time of the last update [s]."""
         self.value = settings.time_gap
         """Time gap [s]."""
 
-    def update(self, scene: Surroundings, position: tuple[float, float], body: Body, *, merges: bool) -> None:
-        """Set the time gap of one decision; `position` are s and d of the vehicle [m]."""
+    def update(
+        self, scene: Surroundings, position: tuple[float, float], body: Body, now: float, *, merges: bool
+    ) -> None:
+        """Set the time gap of the decision at `now` [s]; `position` are s and d of the vehicle [m]."""
+        elapsed, self._updated = max(now - self._updated, 0.0), now
         if merges:
             self.value = min(MERGING_TIME_GAP, self._usual)
         if self.value == self._usual:
@@ -216,6 +220,6 @@ class TimeGap:
         front = max((hypothesis.front for hypothesis in lane if hypothesis.s <= center), default=-math.inf)
         if s - body.rear - front < rear - s - body.front:
             self.value = min(LEAST_TIME_GAP, self._usual)
-        self.value += (self._usual - self.value) * self._period / RELAXATION
+        self.value += (self._usual - self.value) * elapsed / RELAXATION
         if self._usual - self.value < NEARLY:
             self.value = self._usual

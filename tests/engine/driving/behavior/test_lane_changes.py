@@ -15,7 +15,7 @@ from signal_street import CAR
 from eidrive_scenario.base.coverage import ViewSector
 from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.planning.behavior.lane_changes import route_lanes
-from eidrive_scenario.driving.planning.behavior.merging import TrafficBehind
+from eidrive_scenario.driving.planning.behavior.merging import TimeGap, TrafficBehind
 from eidrive_scenario.driving.planning.behavior.prediction import Predictor
 from eidrive_scenario.driving.planning.behavior.proposals import Body
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
@@ -229,6 +229,15 @@ def test_time_gap_increases_after_a_merge() -> None:
     assert gaps[1] == pytest.approx(2.0 + 1.2 * 12.0, abs=1.5), "rolling resistance and drag add to it"
 
 
+@pytest.mark.parametrize("step", [0.1, 0.25, 1.0])
+def test_time_gap_increases_with_time_constant_independently_of_decision_times(step: float) -> None:
+    """The difference to 1.2 s decreases as exp(-t / 25 s)."""
+    time_gap, scene, body = TimeGap(BehaviorSettings()), without_objects(), Body.of(CAR)
+    for tick in range(round(25.0 / step) + 1):
+        time_gap.update(scene, (0.0, 0.0), body, step * tick, merges=tick == 0)
+    assert time_gap.value == pytest.approx(1.2 - (1.2 - 0.56) * math.exp(-1.0), abs=0.01)
+
+
 def test_slow_car_is_overtaken_before_a_later_lane_change() -> None:
     roads = road(2, 1200.0)
     run = PlannedDrive(behavior(roads, 14.0), roads, speed=14.0, y=LANE - WIDTH)
@@ -248,7 +257,7 @@ def test_moving_car_is_not_overtaken_on_the_right() -> None:
     assert run.speeds[-1] == pytest.approx(8.0, abs=0.3)
 
 
-def test_lane_that_begins_anew_is_observed_before_it_counts_as_quiet() -> None:
+def test_lane_that_appears_is_observed_before_it_counts_as_quiet() -> None:
     """A car of 19 m/s needs 3 m + 19 m + 19² m / 9 to slow down for a standing vehicle; the view is 25 m."""
     behind, scene = TrafficBehind(25.0, Body.of(CAR), BehaviorSettings()), without_objects()
     gaps = []
