@@ -57,7 +57,7 @@ from eidrive_scenario.driving.planning.behavior.proposals import (
     towards,
     with_view,
 )
-from eidrive_scenario.driving.planning.behavior.rollout import BRISK, FREE, LIMIT, WALL, Roller, Rollout
+from eidrive_scenario.driving.planning.behavior.rollout import FREE, LIMIT, WALL, Roller, Rollout
 from eidrive_scenario.driving.planning.behavior.scoring import AT_REST, URGENT, Options, evaluate
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.behavior.surroundings import Surroundings, only, surroundings
@@ -529,7 +529,7 @@ class Decider:
         viewpoint = (s, profile.offset_at(s))
         if verdict is Verdict.WAIT:
             sufficient = self._oncoming.place_with_view(profile, scene, beside.oncoming, situation.s)
-            onward_speed = situation.speed_at(profile.places[-3], max(self._settings.acceleration, BRISK))
+            onward_speed = situation.speed_at(profile.places[-3], self._roller.brisk_acceleration)
             better = with_view(profile, situation.start, self._settings, self._body, sufficient, onward_speed)
             if better is not None:
                 profile, waits_at = better, self._oncoming.waiting_place(better, situation.s)

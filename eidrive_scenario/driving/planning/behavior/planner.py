@@ -27,6 +27,7 @@ from eidrive_scenario.driving.planning.behavior.prediction import Predictor
 from eidrive_scenario.driving.planning.behavior.proposals import Body, Wall, speed_limits
 from eidrive_scenario.driving.planning.behavior.reference import ReferenceLine
 from eidrive_scenario.driving.planning.behavior.right_of_way import JunctionRules, Passage
+from eidrive_scenario.driving.planning.behavior.rollout import LEAST_ACCELERATION
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
 from eidrive_scenario.driving.planning.path import PlannedPath
 from eidrive_scenario.driving.planning.route_planner import HORIZON, RoutePlanner
@@ -68,6 +69,8 @@ class BehaviorPlanner(RoutePlanner):
     ) -> None:
         super().__init__(settings, spec, roads, dt=dt, seed=seed)
         own = self.planner_settings
+        usable = min(own.acceleration, max(spec.max_acceleration, LEAST_ACCELERATION))
+        own = self.planner_settings = own.model_copy(update={"acceleration": usable})
         self._times: Array = np.arange(0.0, own.horizon + 1e-9, STEP)
         self._body = Body.of(spec)
         self._memory = ObjectMemory(own)

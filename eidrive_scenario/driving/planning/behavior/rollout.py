@@ -179,7 +179,9 @@ class Roller:
             deceleration=settings.comfortable_deceleration,
             emergency=settings.hard_deceleration,
         )
-        self._brisk_driver = replace(self._driver, acceleration=min(max(settings.acceleration, BRISK), able))
+        self.brisk_acceleration = min(max(settings.acceleration, BRISK), able)
+        """Acceleration past standing objects in a lane of the opposite direction [m/s²]."""
+        self._brisk_driver = replace(self._driver, acceleration=self.brisk_acceleration)
 
     def roll(
         self,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,9 @@ from signal_street import CAR
 from eidrive_scenario.base.requests import Goal
 from eidrive_scenario.driving.control.pid_controller import PidController
 from eidrive_scenario.driving.planning.behavior.decision import Decider
+from eidrive_scenario.driving.planning.behavior.planner import BehaviorPlanner
 from eidrive_scenario.driving.planning.behavior.settings import BehaviorSettings
+from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.readings import EgoState
 
@@ -260,6 +263,17 @@ def test_places_move_by_the_way_driven_when_laps_are_added(monkeypatch: pytest.M
     assert first is None
     assert second == pytest.approx(5.0 - speed * second_time, abs=2.0)
     assert third == pytest.approx(-speed * (third_time - second_time), abs=2.0)
+
+
+@pytest.mark.parametrize(("able", "usable"), [(0.8, 0.8), (4.0, 1.5)])
+def test_weak_vehicle_is_not_held_up_by_a_distant_object(able: float, usable: float) -> None:
+    """A car stands 40 m beside the road; the vehicle accelerates with at most the default of 1.5 m/s²."""
+    settings = AgentSettings.model_validate({"target_speed": 20.0, "planner": "behavior"})
+    planner = BehaviorPlanner(settings, replace(CAR, max_acceleration=able), two_lane_road(400.0), dt=0.05, seed=0)
+    ego = EgoState(0.0, np.array([20.0, LANE, 0.0]), 0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
+    plan = planner.plan(ego, detections(0.0, KnownBox(25.0, 40.0)), Goal(), 0.0)
+    assert plan.acceleration == pytest.approx(usable, abs=0.01)
+    assert not planner._decider._held_up
 
 
 @pytest.mark.parametrize("start", [50.0, 58.0, 59.5])
