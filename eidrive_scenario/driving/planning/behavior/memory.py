@@ -148,9 +148,11 @@ class KnownObject(msgspec.Struct):
     def observe(self, fresh: KnownObject, step: float, shares: _Shares) -> None:
         """Update the object by its new observation.
 
-        step    time since the last observations [s]
-        shares  weights of the new observation after this time
+        step    time since the last decision [s]
+        shares  weights of a new observation after this time
         """
+        if (elapsed := fresh.seen - self.seen) > step:
+            step, shares = elapsed, _Shares.of(elapsed)
         before = self.speed if self.has_velocity else None
         if fresh.has_velocity:
             self.vx, self.vy = fresh.vx, fresh.vy

@@ -28,6 +28,16 @@ def test_velocity_is_estimated_where_the_detector_has_none() -> None:
     assert (known.vx, known.vy) == pytest.approx((-8.0, 0.0), abs=1e-6)
 
 
+def test_velocity_of_a_lost_object_is_that_since_its_last_observation() -> None:
+    """It is seen at 0 m and 0.5 s later at 2 m, by a vehicle that decides every 0.1 s."""
+    objects, box = memory(), KnownBox(0.0, vx=math.nan, vy=math.nan)
+    objects.update(detections(0.0, box), 0.0)
+    for now in (0.1, 0.2, 0.3, 0.4):
+        objects.update(Detections(now), now)
+    (known,) = objects.update(detections(0.5, box._replace(x=2.0)), 0.5)
+    assert (known.vx, known.vy) == pytest.approx((4.0, 0.0))
+
+
 def test_measured_velocity_is_taken_as_it_is() -> None:
     objects = memory()
     for now in (0.0, 0.1):
