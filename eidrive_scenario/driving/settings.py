@@ -168,6 +168,13 @@ class AgentSettings(Settings):
         check_unique(sensors or {})
         return sensors
 
+    @field_validator("messages")
+    @classmethod
+    def _check_unique_messages(cls, messages: tuple[str, ...]) -> tuple[str, ...]:
+        if len(set(messages)) < len(messages):
+            raise ValueError(f"a station sends each kind of message once (got {', '.join(messages)})")
+        return messages
+
     @model_validator(mode="after")
     def _one_way_to_generate(self) -> AgentSettings:
         if self.generation == "rate" and self.message_rate is None:

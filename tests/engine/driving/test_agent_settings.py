@@ -136,6 +136,7 @@ WRONG = [
         [("min_existence", "0.2"), ("planner_settings", "{min_existence: 0.4}")],
         "s.xosc:12: setting 'min_existence' of the planner is given twice; remove it from 'planner_settings'",
     ),
+    ([("messages", "cpm, cam, cpm")], "a station sends each kind of message once (got cpm, cam, cpm)"),
     ([("conflict_area", "[3, 1, 0, 1]")], "the rectangle [3, 1, 0, 1] is empty"),
     ([("conflict_area", "[1, 2, 3]")], "an area is [x0, x1, y0, y1]"),
     ([("conflict_area", "5")], "an area is [x0, x1, y0, y1]"),
