@@ -89,7 +89,7 @@ def split_planner_settings(
     is_known = isinstance(name, str) and (name == NO_PLANNER or name in registry("planners"))
     model = planner_settings_type(name if is_known else None)
     own = {key: rest.pop(key) for key in list(rest) if key not in station_settings and key in model.model_fields}
-    for key in own.keys() & nested.keys():
+    for key in [key for key in own if key in nested]:
         message = f"setting {key!r} of the planner is given twice"
         diagnostics.append(Diagnostic(message, "remove it from 'planner_settings'", source, lines.get(key)))
     for key in [key for key in rest if key not in station_settings]:

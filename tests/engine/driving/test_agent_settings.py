@@ -163,6 +163,14 @@ def test_invalid_property_is_reported_with_line_and_hint(entries: list[tuple[str
     assert "s.xosc:" in str(caught.value)
 
 
+def test_duplicate_settings_of_the_planner_are_reported_in_order_of_properties() -> None:
+    names = ["horizon", "memory", "time_gap", "caution", "uncertainty"]
+    nested = "{uncertainty: 1, caution: true, time_gap: 1, memory: 1, horizon: 8}"
+    with pytest.raises(SettingError) as caught:
+        settings(*((name, "true" if name == "caution" else "8") for name in names), ("planner_settings", nested))
+    assert [diagnostic.message.split("'")[1] for diagnostic in caught.value.diagnostics][:5] == names
+
+
 def test_all_diagnostics_are_reported_at_once() -> None:
     with pytest.raises(SettingError) as caught:
         settings(("detector", "x"), ("color", "red"), ("range", "-1"))
