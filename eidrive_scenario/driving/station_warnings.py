@@ -63,8 +63,11 @@ def distance_to_road(area: Polygon, roads: RoadNetwork) -> float:
     centers = [
         (low[0] + (i + 0.5) * step[0], low[1] + (j + 0.5) * step[1]) for i in range(_CELLS) for j in range(_CELLS)
     ]
-    points = [*area, *(center for center in centers if point_in_polygon(*center, area))]
     reach = math.hypot(*step) / 2.0
+    # An edge is at most as long as the diagonal of all cells, so that its samples are at most `reach` apart.
+    corners, shares = np.array(area, dtype=float), np.arange(2 * _CELLS)[:, None, None] / (2 * _CELLS)
+    edges = corners + shares * (np.roll(corners, -1, axis=0) - corners)
+    points = [*edges.reshape(-1, 2), *(center for center in centers if point_in_polygon(*center, area))]
     x, y = np.array(points, dtype=float).T
     nearest = float(roads.locate(x, y, reach=np.inf).outside.min())
     return max(0.0, nearest - reach)
