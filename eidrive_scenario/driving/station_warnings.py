@@ -208,8 +208,11 @@ class MotionlessStations:
             if name in drivers:
                 self._since.setdefault(name, view.time)
                 self._reached[name] = max(self._reached.get(name, 0.0), math.hypot(x - start[0], y - start[1]))
-            elif name not in self._reached:
-                self._starts[name] = None  # The start of a scripted station is where it begins to drive
+            elif view.time - self._since.get(name, math.inf) < PATIENCE:
+                # The start of a scripted station is where it begins to drive
+                self._starts[name] = None
+                self._since.pop(name, None)
+                self._reached.pop(name, None)
             if self._reached.get(name, 0.0) >= LEAST:
                 del self._starts[name]
                 self.watching = bool(self._starts)
