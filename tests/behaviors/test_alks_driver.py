@@ -97,8 +97,8 @@ def test_wrong_way_actor_brakes_as_one_in_its_driving_direction(
     for sign, turn in ((1, 0.0), (-1, math.pi)):
         pose = f'<Orientation type="relative" h="{turn}"/>'
         beside = lane_position_xml(1 if sign < 0 else -2, 500.0 + sign * 40.0)
-        place = beside if steps else lane_position_xml(-1, 500.0 + sign * 40.0, inside=pose)
-        turned = ("Ego", teleport_xml(lane_position_xml(-1, 500.0, inside=pose))), ("Other", teleport_xml(place))
+        destination = beside if steps else lane_position_xml(-1, 500.0 + sign * 40.0, inside=pose)
+        turned = ("Ego", teleport_xml(lane_position_xml(-1, 500.0, inside=pose))), ("Other", teleport_xml(destination))
         played = scene(
             8,
             *turned,

@@ -76,20 +76,20 @@ def test_gap_to_leader_follows_the_lane_around_a_bend() -> None:
 
 def test_car_on_the_other_side_is_oncoming_beside() -> None:
     cars = view(Ego=at("1", -1, 20.0), Other=at("1", 1, 60.0, speed=4.0))
-    (found,) = Surroundings(ROADS).relations(cars, "Ego")
-    assert found.gap == pytest.approx(36.0)
-    assert found.side_gap == pytest.approx(1.5)
-    assert found.other_speed == pytest.approx(-4.0)
-    assert not found.leads
-    assert not found.wrong_way
+    (other_actor,) = Surroundings(ROADS).relations(cars, "Ego")
+    assert other_actor.gap == pytest.approx(36.0)
+    assert other_actor.side_gap == pytest.approx(1.5)
+    assert other_actor.other_speed == pytest.approx(-4.0)
+    assert not other_actor.leads
+    assert not other_actor.wrong_way
 
 
 def test_actor_in_the_wrong_lane_is_recognized() -> None:
     x, y, yaw, speed = at("1", 1, 20.0)
     cars = view(Ego=(x, y, yaw + math.pi, speed), Other=at("1", 1, 60.0))
-    (found,) = Surroundings(ROADS).relations(cars, "Ego")
-    assert found.wrong_way
-    assert found.gap == pytest.approx(36.0)
+    (other_actor,) = Surroundings(ROADS).relations(cars, "Ego")
+    assert other_actor.wrong_way
+    assert other_actor.gap == pytest.approx(36.0)
 
 
 def test_car_straight_across_the_junction_leads() -> None:
@@ -110,7 +110,7 @@ def test_actors_away_from_the_lane_have_no_relation() -> None:
     """Cars on the crossing road and in a row 60 m beside the lane."""
     others = {f"Far{n}": (-80.0 + 5.0 * n, -60.0, 0.0, 5.0) for n in range(20)}
     cars = view(Ego=at("1", -1, 20.0), Lead=at("1", -1, 50.0), Crossing=at("3", -1, 90.0), **others)
-    assert [found.other for found in Surroundings(ROADS).relations(cars, "Ego")] == ["Lead"]
+    assert [other_actor.other for other_actor in Surroundings(ROADS).relations(cars, "Ego")] == ["Lead"]
 
 
 def test_absent_actor_has_no_relations() -> None:
@@ -124,8 +124,8 @@ def relation(roads: RoadNetwork, own: tuple[str, int, float], other: tuple[str, 
         place = roads.lane_pose_at(road, lane, s)
         return place.x, place.y, place.h + (0.0 if roads.driving_direction(road, lane) > 0 else math.pi), 5.0
 
-    (found,) = Surroundings(roads).relations(view(Ego=pose(*own), Lead=pose(*other)), "Ego")
-    return found
+    (other_actor,) = Surroundings(roads).relations(view(Ego=pose(*own), Lead=pose(*other)), "Ego")
+    return other_actor
 
 
 SHIFT = 3.5
@@ -141,16 +141,16 @@ def shifted_road() -> RoadNetwork:
 
 @pytest.mark.parametrize(("own", "lead"), [(-1, 120.0), (-2, 120.0), (-1, 60.0)])
 def test_car_in_the_same_lane_after_a_lane_offset_leads(own: int, lead: float) -> None:
-    found = relation(shifted_road(), ("1", own, 20.0), ("1", own, lead))
-    assert found.leads
-    assert found.left == pytest.approx(0.0, abs=1e-9)
+    other_actor = relation(shifted_road(), ("1", own, 20.0), ("1", own, lead))
+    assert other_actor.leads
+    assert other_actor.left == pytest.approx(0.0, abs=1e-9)
 
 
 def test_car_straight_ahead_after_a_lane_offset_does_not_lead() -> None:
     """After the shift, lane -2 is where lane -1 was."""
-    found = relation(shifted_road(), ("1", -1, 20.0), ("1", -2, 120.0))
-    assert not found.leads
-    assert found.left == pytest.approx(-3.5)
+    other_actor = relation(shifted_road(), ("1", -1, 20.0), ("1", -2, 120.0))
+    assert not other_actor.leads
+    assert other_actor.left == pytest.approx(-3.5)
 
 
 @pytest.mark.parametrize(("lane", "leads"), [(-2, True), (-1, False)])
@@ -159,8 +159,8 @@ def test_lane_beside_a_new_lane_continues(lane: int, leads: bool) -> None:
     before = section_xml(lane_xml(1), lane_xml(-1, link='<successor id="-2"/>'))
     after = section_xml(lane_xml(1), lane_xml(-1) + lane_xml(-2, link='<predecessor id="-1"/>'), s=60)
     roads = RoadNetwork.parse(map_xml(road_xml(length=200.0, lanes=before + after)))
-    found = relation(roads, ("1", -1, 20.0), ("1", lane, 120.0))
-    assert found.leads is leads
+    other_actor = relation(roads, ("1", -1, 20.0), ("1", lane, 120.0))
+    assert other_actor.leads is leads
     behind = relation(roads, ("1", -2, 70.0), ("1", -1, 50.0))
     assert behind.left == pytest.approx(0.0)
     assert behind.ahead == pytest.approx(-20.0)
@@ -207,9 +207,9 @@ def test_gap_in_a_bend_is_measured_along_the_lane(lane: int, radius: float) -> N
         for _, s in (first, second)[::way]:
             half = 20.0 * math.pi
             places.append(("a", lane, s) if s < half else ("b", lane, s - half))
-        found = relation(roads, *places)
-        assert found.ahead == pytest.approx(radius * math.pi / 3.0, rel=2e-3)
-        assert found.leads
+        other_actor = relation(roads, *places)
+        assert other_actor.ahead == pytest.approx(radius * math.pi / 3.0, rel=2e-3)
+        assert other_actor.leads
 
 
 @pytest.mark.parametrize("reverse", [False, True])
@@ -240,12 +240,12 @@ def test_actor_behind_the_border_of_a_road_in_a_curve(lane: int, beside: int, re
     second = road_xml("b", length=60.0, curvature=0.025, link=link, lanes=lanes(-1 if reverse else 1, 1))
     roads = RoadNetwork.parse(map_xml(first, second))
     way = -1 if lane > 0 else 1
-    found = relation(roads, place(lane, 2.0 * way), place(beside, -8.0 * way))
+    other_actor = relation(roads, place(lane, 2.0 * way), place(beside, -8.0 * way))
     own, other = ((n - math.copysign(0.5, n)) * 3.5 for n in (lane, beside))
-    assert found.ahead == pytest.approx(-10.0 * (40.0 - own) / 40.0, rel=2e-3)
-    assert found.left == pytest.approx((other - own) * way)
-    assert found.side_gap == pytest.approx(1.5)
-    assert abs(found.other_side_speed) < 1e-6
+    assert other_actor.ahead == pytest.approx(-10.0 * (40.0 - own) / 40.0, rel=2e-3)
+    assert other_actor.left == pytest.approx((other - own) * way)
+    assert other_actor.side_gap == pytest.approx(1.5)
+    assert abs(other_actor.other_side_speed) < 1e-6
 
 
 def test_actor_behind_a_fork_or_a_merge_is_placed_straight() -> None:

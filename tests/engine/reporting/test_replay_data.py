@@ -235,9 +235,9 @@ def test_closest_approach_is_the_distance_that_a_criterion_measured() -> None:
 
 def test_closest_approach_names_actors_with_dots() -> None:
     metrics = {"min_distance.Ego.v2.Car.1.center": 4.5, "min_distance.Ego.v2.Car.1.time": 3.0}
-    found = closest_approach(metrics, distance_verdicts(4.5), ["Car.1", "Ego.v2"])
-    assert found is not None
-    assert found["text"] == "closest approach of Ego.v2 and Car.1: 4.50 m between centers"
+    closest = closest_approach(metrics, distance_verdicts(4.5), ["Car.1", "Ego.v2"])
+    assert closest is not None
+    assert closest["text"] == "closest approach of Ego.v2 and Car.1: 4.50 m between centers"
     unknown = closest_approach(metrics, distance_verdicts(4.5))
     assert unknown is not None
     assert unknown["text"] == "closest approach of Ego.v2.Car.1: 4.50 m between centers"
