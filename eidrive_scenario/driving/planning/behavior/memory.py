@@ -151,15 +151,14 @@ class KnownObject(msgspec.Struct):
         step    time since the last decision [s]
         shares  weights of a new observation after this time
         """
-        if (elapsed := fresh.seen - self.seen) > step:
-            step, shares = elapsed, _Shares.of(elapsed)
         before = self.speed if self.has_velocity else None
         if fresh.has_velocity:
             self.vx, self.vy = fresh.vx, fresh.vy
         elif step > 0.0:
             share = SMOOTHING if self.has_velocity else 1.0
-            self.vx += share * (fresh.x - self.x) / step
-            self.vy += share * (fresh.y - self.y) / step
+            elapsed = max(fresh.seen - self.seen, step)
+            self.vx += share * (fresh.x - self.x) / elapsed
+            self.vy += share * (fresh.y - self.y) / elapsed
         speed = self.speed
         if before is not None and step > 0.0:
             change = (speed - before) / step

@@ -310,9 +310,7 @@ def _overlaps(
 
 def _shifted(values: Array, steps: int) -> Array:
     """Return values (N, K) of `steps` later times; the last or first one is repeated."""
-    last = values.shape[1] - 1
-    index = np.minimum(np.maximum(np.arange(steps, steps + last + 1), 0), last)
-    return np.asarray(values[:, index])
+    return np.asarray(np.take(values, np.arange(steps, steps + values.shape[1]), axis=1, mode="clip"))
 
 
 def _recent_maximum(values: Array, steps: int) -> Array:
