@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from heapq import heappop, heappush
-from itertools import count, pairwise
+from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from eidrive_scenario.traffic.leaders import FIXED, FOREIGN, Leaders, find_follo
 from eidrive_scenario.traffic.occupancy import TALLEST
 from eidrive_scenario.traffic.right_of_way import STOP_LINE, TOO_LATE
 from eidrive_scenario.traffic.spawning.bodies import Participant
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 SPACING = 5.0
 """Distance between the sites along a lane [m]."""
@@ -257,7 +260,7 @@ def road_range(roads: RoadNetwork, cursors: Sequence[Cursor], length: float | No
     shortest chain of linked roads with all their lanes. `length` truncates the range from the first cursor on [m].
     Raise PositionError if a road does not exist or the roads are not linked.
     """
-    ends = _links(roads)
+    links = _links(roads)
     parts: list[tuple[Stretch, bool]] = []
     for number, (start, end) in enumerate(pairwise(cursors)):
         first, last = roads.road(start.road).length, roads.road(end.road).length
@@ -266,7 +269,7 @@ def road_range(roads: RoadNetwork, cursors: Sequence[Cursor], length: float | No
         if start.road == end.road:
             parts.append((Stretch(start.road, min(here, there), max(here, there), start.lanes), there >= here))
             continue
-        chain = _chain(roads, ends, start.road, end.road)
+        chain = _chain(links, start.road, end.road)
         leaving, *between, entering = chain
         forward = leaving.side > 0
         if start.s is None and number == 0 and not forward:
@@ -294,36 +297,32 @@ def _cut(parts: Sequence[tuple[Stretch, bool]], length: float | None) -> list[St
     return cut
 
 
-def _links(roads: RoadNetwork) -> Mapping[RoadEnd, list[RoadEnd]]:
-    """Return the connected ends of roads by the links of lanes."""
-    links: dict[RoadEnd, list[RoadEnd]] = {}
+def _links(roads: RoadNetwork) -> nx.DiGraph[RoadEnd]:
+    """Return the ends at which roads are left, with edges over linked roads and the lengths of these."""
+    import networkx as nx
+
+    links: nx.DiGraph[RoadEnd] = nx.DiGraph()
+    links.add_nodes_from(RoadEnd(road, side) for road in roads.roads for side in (1, -1))
     for lane, successor, edge in roads.graph.edges(data=True):
         if edge["kind"] == "successor" and lane.road != successor.road:
             leaving = RoadEnd(lane.road, roads.driving_direction(lane.road, lane.lane))
             entering = RoadEnd(successor.road, -roads.driving_direction(successor.road, successor.lane))
             for a, b in ((leaving, entering), (entering, leaving)):
-                if b not in links.setdefault(a, []):
-                    links[a].append(b)
+                links.add_edge(a, RoadEnd(b.road, -b.side), length=roads.road(b.road).length)
     return links
 
 
-def _chain(roads: RoadNetwork, ends: Mapping[RoadEnd, list[RoadEnd]], start: str, goal: str) -> list[RoadEnd]:
+def _chain(links: nx.DiGraph[RoadEnd], start: str, goal: str) -> list[RoadEnd]:
     """Return the road ends from the exit of `start` to the entry of `goal`; roads between have two consecutive ends.
 
-    Their total length is minimal (Dijkstra's algorithm).
+    Their total length is minimal.
     """
-    numbers = count()
-    queue = [(0.0, next(numbers), [RoadEnd(start, side)]) for side in (1, -1)]
-    seen: set[RoadEnd] = set()
-    while queue:
-        length, _, chain = heappop(queue)
-        if chain[-1] in seen:
-            continue
-        seen.add(chain[-1])
-        for end in ends.get(chain[-1], ()):
-            if end.road == goal:
-                return [*chain, end]
-            longer = length + roads.road(end.road).length
-            heappush(queue, (longer, next(numbers), [*chain, end, RoadEnd(end.road, -end.side)]))
-    message = f"no chain of roads leads from road {start!r} to road {goal!r}"
-    raise PositionError(Diagnostic(message, "correct the road cursors"))
+    import networkx as nx
+
+    lengths, paths = nx.multi_source_dijkstra(links, [RoadEnd(start, side) for side in (1, -1)], weight="length")
+    reached = [end for end in (RoadEnd(goal, 1), RoadEnd(goal, -1)) if end in lengths]
+    if not reached:
+        message = f"no chain of roads leads from road {start!r} to road {goal!r}"
+        raise PositionError(Diagnostic(message, "correct the road cursors"))
+    first, *exits = paths[min(reached, key=lengths.__getitem__)]
+    return [first, *(end for out in exits for end in (RoadEnd(out.road, -out.side), out))][:-1]
