@@ -240,7 +240,11 @@ class Seconds(Form):
     unit: ClassVar[str] = "s"
 
     def check(self, name: str, value: Any) -> float:
-        seconds = float(_checked(name, value, (Real,), "a number of seconds"))
+        _checked(name, value, (Real,), "a number of seconds")
+        try:
+            seconds = float(value)
+        except OverflowError:
+            seconds = math.inf
         if self.is_positive and not 0.0 < seconds < math.inf:
             raise SettingError(Diagnostic(f"{name} is {value}", "give a positive number of seconds"))
         return seconds

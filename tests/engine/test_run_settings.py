@@ -115,7 +115,7 @@ def test_time_step_is_the_number_of_its_command(step: Any) -> None:
     assert settings.dt == (float(words[1]) if words else 0.05) == float(step)
 
 
-@pytest.mark.parametrize("limit", [0.0, -1.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("limit", [0.0, -1.0, float("nan"), float("inf"), 10**400])
 def test_nonpositive_or_infinite_time_limit_raises(limit: float) -> None:
     """A run up to a time that is not a number would never end, and no command line has an infinite one."""
     with pytest.raises(SettingError, match=r"time_limit is .*; give a positive number of seconds"):
