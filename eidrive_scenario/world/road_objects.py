@@ -201,12 +201,13 @@ def _head(signal: Signal, pose: Pose, carried: bool) -> SignalHead:
 def object_bodies(roads: RoadNetwork, placed: PlacedObject) -> Iterator[RoadObjectBody]:
     """Yield the bodies of an object; none if it is painted on the road, or a building."""
     road_object = placed.object
-    kind = KINDS.get(road_object.type)
-    boxes, height = footprint(roads, placed), object_height(placed)
-    if kind is None and road_object.type in WITHOUT_TYPE and height >= STEP:
-        kind = "obstacle" if any(min(length, width) >= STEP for _, length, width in boxes) else None
-    if kind is None:
+    kind, height = KINDS.get(road_object.type), object_height(placed)
+    if kind is None and (road_object.type not in WITHOUT_TYPE or height < STEP):
         return
+    boxes = footprint(roads, placed)
+    if kind is None and all(min(length, width) < STEP for _, length, width in boxes):
+        return
+    kind = kind or "obstacle"
     usual = SIZES[kind]
     height = height or usual[2]
     if height < LEAST:

@@ -221,7 +221,8 @@ class Tracker(TrackingMethod):
     ) -> dict[int, int]:
         """Return which of the boxes in `columns` overlap with the body of a confirmed track, with its row.
 
-        The body is one with a detected box, or else that in whose middle the box is most. So are the boxes in order.
+        Of several bodies it is one with a detected box, or else the one in which the box is nearest to the middle,
+        relative to its size. The boxes are in this order.
 
         apart  (N, M) whether track and box are on two levels
 
