@@ -319,10 +319,10 @@ def _chain(links: nx.DiGraph[RoadEnd], start: str, goal: str) -> list[RoadEnd]:
     """
     import networkx as nx
 
-    lengths, paths = nx.multi_source_dijkstra(links, [RoadEnd(start, side) for side in (1, -1)], weight="length")
-    reached = [end for end in (RoadEnd(goal, 1), RoadEnd(goal, -1)) if end in lengths]
-    if not reached:
+    paths = nx.multi_source_dijkstra_path(links, [RoadEnd(start, side) for side in (1, -1)], weight="length")
+    reaching = [paths[end] for end in (RoadEnd(goal, 1), RoadEnd(goal, -1)) if end in paths]
+    if not reaching:
         message = f"no chain of roads leads from road {start!r} to road {goal!r}"
         raise PositionError(Diagnostic(message, "correct the road cursors"))
-    first, *exits = paths[min(reached, key=lengths.__getitem__)]
+    first, *exits = min(reaching, key=lambda path: nx.path_weight(links, path, weight="length"))
     return [first, *(end for out in exits for end in (RoadEnd(out.road, -out.side), out))][:-1]
