@@ -63,7 +63,7 @@ class CameraImageWriter:
                     image = draw_image_detections(reading.rgb, detections[camera])
                 else:
                     image = draw_projected_boxes(reading, frame.steps[station].detections)
-                folder = self._folder / quote(station, safe=" ")
+                folder = self._folder / _folder_name(station)
                 if (station, camera) not in self._described and station in frame.view:
                     self._described.add((station, camera))
                     _describe(reading, frame, station, folder / camera_file(camera))
@@ -78,6 +78,12 @@ class CameraImageWriter:
         _, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
         with create(path) as stream:
             stream.write(data.tobytes())
+
+
+def _folder_name(station: str) -> str:
+    """Return the name of the folder of a station, from which `unquote` returns the station."""
+    name = quote(station, safe=" ")
+    return f"%2E{name[1:]}" if name.startswith(".") else name  # `.` and `..` are other folders
 
 
 def image_file(camera: str, tick: int) -> str:

@@ -4,21 +4,27 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from written_recording import view
 
 from eidrive_scenario.base.detections import Detections
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.perception.detector import ImageDetections
 from eidrive_scenario.recording.camera_images import (
+    CameraImageWriter,
     camera_file,
     draw_image_detections,
     draw_projected_boxes,
     image_file,
+    pictures_in,
 )
+from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.recording.run_files import IMAGES
 from eidrive_scenario.sensing.readings import CameraReading
@@ -67,6 +73,16 @@ def test_projected_box_is_drawn_at_its_projected_corners() -> None:
     assert changed[40:61, 90].all()
     assert not draw(behind).any()
     np.testing.assert_array_equal(draw(ahead, behind), changed)
+
+
+@pytest.mark.parametrize("station", [".", "..", ".a/b %2E"])
+def test_images_of_station_named_like_a_folder_stay_below_theirs(tmp_path: Path, station: str) -> None:
+    nothing = ImageDetections(np.empty((0, 4)), np.empty(0), ())
+    readings = {station: SimpleNamespace(cameras={"front": SimpleNamespace(rgb=GRAY)})}
+    stack: Any = SimpleNamespace(readings=readings, image_detections=lambda name: {"front": nothing})
+    CameraImageWriter(tmp_path / IMAGES, stack).observe(Frame(view({}, tick=3)))
+    assert [picture[:3] for picture in pictures_in(tmp_path / IMAGES)] == [(station, "front", 3)]
+    assert [path.name for path in tmp_path.iterdir()] == [IMAGES]
 
 
 @pytest.mark.exhaustive
