@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
+from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Bools
 from eidrive_scenario.driving.step import OWN_DECISIONS, StationAction, StationPerception
@@ -45,7 +46,7 @@ class ActionDecoder:
                 self._level = min(range(len(action.speeds)), key=lambda level: abs(action.speeds[level] - speed))
 
     def decode(self, given: Any, perceived: StationPerception) -> StationAction:
-        """Return the decisions of an action for a step that starts with this perception.
+        """Return the decisions of an action for a step that starts with this perception; `begin_step` begins that step.
 
         Raise SettingError if the space does not contain the action.
         """
@@ -58,6 +59,12 @@ class ActionDecoder:
         for kind, action in self._actions.items():
             decided = self._decode(action, given[kind], perceived, decided)
         return decided
+
+    def begin_step(self, decided: StationAction) -> None:
+        """Begin the step of decoded decisions: the next relative speed starts from theirs."""
+        for action in self._actions.values():
+            if isinstance(action, MetaSpeed) and decided.target_speed is not None:
+                self._level = action.speeds.index(decided.target_speed)
 
     def select_again(self, decided: StationAction, perceived: StationPerception) -> StationAction:
         """Return the last decoded decisions for a later tick: shared objects are the nearest ones at that time."""
@@ -79,10 +86,10 @@ class ActionDecoder:
             return replace(decided, control=Control(max(pedal, 0.0), max(-pedal, 0.0), steering))
         if isinstance(action, MetaSpeed):
             if action.relative:
-                self._level = min(max(self._level + _index(given, 3) - 1, 0), len(action.speeds) - 1)
+                level = min(max(self._level + _index(given, 3) - 1, 0), len(action.speeds) - 1)
             else:
-                self._level = _index(given, len(action.speeds))
-            return replace(decided, target_speed=action.speeds[self._level])
+                level = _index(given, len(action.speeds))
+            return replace(decided, target_speed=action.speeds[level])
         if isinstance(action, SendMessages):
             return replace(decided, send=bool(_index(given, 2)))
         self._mask = _mask(given, action.count)
@@ -104,10 +111,7 @@ def _space(action: ActionSettings) -> spaces.Space[Any]:
 def _numbers(given: Any, count: int) -> list[float]:
     """Return numbers in [-1, 1]."""
     expected = f"{counted(count, 'number')} from -1 to 1"
-    try:
-        values = np.asarray(given, dtype=float).reshape(-1).tolist()
-    except (TypeError, ValueError):
-        raise _outside(given, expected) from None
+    values = _array(given, expected, float).reshape(-1).tolist()
     if len(values) != count or not all(abs(value) <= 1.0 + _TOLERANCE for value in values):
         raise _outside(given, expected)
     return [min(max(value, -1.0), 1.0) for value in values]
@@ -115,18 +119,28 @@ def _numbers(given: Any, count: int) -> list[float]:
 
 def _index(given: Any, count: int) -> int:
     """Return an integer from 0 to `count` - 1."""
-    value = np.asarray(given)
+    expected = f"an integer from 0 to {count - 1}"
+    value = _array(given, expected)
     if value.size != 1 or value.dtype.kind not in "iu" or not 0 <= int(value.item()) < count:
-        raise _outside(given, f"an integer from 0 to {count - 1}")
+        raise _outside(given, expected)
     return int(value.item())
 
 
 def _mask(given: Any, count: int) -> Bools:
     """Return `count` truth values."""
-    value = np.asarray(given)
+    expected = f"{counted(count, 'number')} out of 0 and 1"
+    value = _array(given, expected)
     if value.shape != (count,) or not np.isin(value, (0, 1)).all():
-        raise _outside(given, f"{counted(count, 'number')} out of 0 and 1")
+        raise _outside(given, expected)
     return value.astype(bool)
+
+
+def _array(given: Any, expected: str, dtype: type[float] | None = None) -> NDArray[Any]:
+    """Return an action as an array. Raise SettingError if it has no such form."""
+    try:
+        return np.asarray(given, dtype)
+    except (OverflowError, TypeError, ValueError):
+        raise _outside(given, expected) from None
 
 
 def _outside(given: Any, expected: str) -> SettingError:

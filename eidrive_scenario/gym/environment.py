@@ -21,6 +21,7 @@ from eidrive_scenario.gym.settings import (
 )
 from eidrive_scenario.gym.station_interface import RewardSettings, StationInterface, parse_mapping, sum_terms
 from eidrive_scenario.openscenario import ConcreteRun, Scenario, Source, load_scenario
+from eidrive_scenario.recording.frame import MAX_TICK
 from eidrive_scenario.run_options import Switch, checked_settings
 from eidrive_scenario.simulation import DEFAULT_SEED, RunSettings, Simulation
 from eidrive_scenario.simulation.run_outcome import TIME_LIMIT
@@ -38,10 +39,11 @@ Outcome = tuple[dict[str, Any], dict[str, float], dict[str, bool], dict[str, boo
 
 
 def _check_steps(max_steps: int | None, ticks_per_step: int) -> None:
-    """Raise SettingError unless both are positive integers."""
+    """Raise SettingError unless both are positive integers of at most `MAX_TICK`."""
     for name, value in (("max_steps", max_steps), ("ticks_per_step", ticks_per_step)):
-        if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 1):
-            raise SettingError(Diagnostic(f"{name} is {quoted(value)}", "give a positive integer"))
+        if value is not None and (isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MAX_TICK):
+            hint = f"give a positive integer of at most {MAX_TICK}"
+            raise SettingError(Diagnostic(f"{name} is {quoted(value)}", hint))
 
 
 def checked_mapping(name: str, value: Any) -> Mapping[str, Any]:
@@ -227,6 +229,8 @@ class ScenarioEnvironment:
         acting = self.agents
         decoders = {name: self._interfaces[name].decoder for name in acting}
         decided = {name: decoder.decode(actions[name], episode.perceived[name]) for name, decoder in decoders.items()}
+        for name, decoder in decoders.items():  # only now that the actions of all agents are valid
+            decoder.begin_step(decided[name])
 
         def decide(perceived: Mapping[str, StationPerception]) -> Mapping[str, StationAction]:
             live = [name for name in acting if name in perceived and name not in self._left]

@@ -174,6 +174,7 @@ def test_vectorized_episodes_are_those_of_single_environments(mode: str) -> None
         ({"observation": {"route": {"points": 30}}}, "points x spacing is above 59 m"),
         ({"reward": 3}, "reward is 3; give a mapping or RewardSettings"),
         ({"max_steps": 0}, "max_steps is 0; give a positive integer"),
+        ({"ticks_per_step": 10**400}, "ticks_per_step is .*; give a positive integer of at most 4294967295"),
         ({"terminate_on_collision": "no"}, "terminate_on_collision is 'no'; give True or False"),
         ({"render_mode": "human"}, "render_mode is 'human'"),
         ({"settings": RunSettings(channel="idel")}, "idel"),
@@ -197,9 +198,12 @@ def test_scenario_without_station_is_an_error() -> None:
         ("pedals", [0.0], "give 2 numbers from -1 to 1"),
         ("meta_speed", 3, "give an integer from 0 to 2"),
         ("meta_speed", 0.5, "give an integer from 0 to 2"),
+        ("meta_speed", [[1], [1, 2]], "give an integer from 0 to 2"),
+        ("target_speed", [10**400], "give 1 number from -1 to 1"),
         (["pedals", "send"], {"pedals": [0, 0]}, "give a mapping with the keys pedals, send"),
         (["pedals", "send"], {"pedals": [0, 0], "send": 1, "share": 1}, "give a mapping with the keys pedals, send"),
         ({"kind": "share", "count": 2}, [0, 1, 1], "give 2 numbers out of 0 and 1"),
+        ({"kind": "share", "count": 2}, [[0], [0, 1]], "give 2 numbers out of 0 and 1"),
     ],
 )
 def test_actions_outside_of_the_space_are_errors(action: Any, given: Any, message: str) -> None:
@@ -207,6 +211,24 @@ def test_actions_outside_of_the_space_are_errors(action: Any, given: Any, messag
     env.reset(seed=1)
     with pytest.raises(SettingError, match=message):
         env.step(given)
+    env.close()
+
+
+def test_invalid_action_does_not_change_the_relative_speed() -> None:
+    """The car stands at the lowest speed, so that `faster` and `keep` select the second one."""
+    env = EidriveEnv(lone_car(), action=[{"kind": "meta_speed", "speeds": [0.0, 4.0, 8.0]}, "send"])
+    env.reset(seed=1)
+    with pytest.raises(SettingError, match="the action is 2; give an integer from 0 to 1"):
+        env.step({"meta_speed": 2, "send": 2})
+    env.step({"meta_speed": 2, "send": 1})
+    *_, end, limit, _ = env.step({"meta_speed": 1, "send": 1})
+    assert (end, limit) == (False, False)
+    assert env._episode is not None
+    frame = env._episode.last_frame
+    assert frame is not None
+    plan = frame.steps["Ego"].plan
+    assert plan is not None
+    assert max(plan.speeds) == pytest.approx(4.0)
     env.close()
 
 
