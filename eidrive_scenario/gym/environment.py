@@ -175,7 +175,7 @@ class ScenarioEnvironment:
         """Start an episode at the first tick in which a controlled station is present.
 
         drawn_seed  seed of the run, unless the options contain one
-        absent      error if no controlled station is ever present
+        absent      error if no controlled station is present before the last tick
 
         Return the first observations by agent; and seed, time [s] and parameters. The steps are counted from that tick
         on. Raise SettingError for unknown options, and for the reward of a criterion that the run does not have.
@@ -201,9 +201,9 @@ class ScenarioEnvironment:
         except BaseException:
             episode.close()
             raise
-        self._episode, self.agents = episode, self._present(episode)
-        if not self.agents:
+        if episode.result is not None:  # also if a station enters with the last tick, after which there is no step
             raise SettingError(absent)
+        self._episode, self.agents = episode, self._present(episode)
         for name in self.agents:
             self._interfaces[name].begin(episode)
         if self._renderer is not None:
@@ -348,7 +348,7 @@ class EidriveEnv(ScenarioEnvironment, gymnasium.Env[Any, Any]):
         If the station enters the world later, the run advances until then. Raise SettingError if it never does.
         """
         super().reset(seed=seed)
-        absent = Diagnostic(f"station {self.station!r} never enters the world", "select another one")
+        absent = Diagnostic(f"station {self.station!r} never enters the world before the last tick", "select another")
         observations, info = self._start(int(self.np_random.integers(MAX_SEED)), options, absent)
         return observations[self.station], info
 

@@ -68,7 +68,7 @@ class EidriveParallelEnv(ScenarioEnvironment, ParallelEnv[str, Any, Any]):  # ty
         if seed is not None:
             self._generator, _ = gymnasium.utils.seeding.np_random(seed)
         supported = {key: value for key, value in checked_mapping("options", options).items() if key in OPTIONS}
-        absent = Diagnostic("no controlled station enters the world", "select other stations")
+        absent = Diagnostic("no controlled station enters the world before the last tick", "select other stations")
         observations, info = self._start(int(self._generator.integers(MAX_SEED)), supported, absent)
         return observations, {name: dict(info) for name in observations}
 

@@ -22,6 +22,7 @@ from storyboard_xml import (
     trigger_xml,
 )
 
+from eidrive_scenario.errors import SettingError
 from eidrive_scenario.gym import EidriveEnv, EidriveParallelEnv
 
 ADDED, DELETED, RETURNED = 1.0, 2.0, 2.5
@@ -62,6 +63,13 @@ def test_limit_of_steps_counts_from_the_entry_of_the_station() -> None:
     info = outcomes[-1][-1]
     assert info["time"] == pytest.approx(start + 12 * DT)
     assert info["result"].settings.time_limit == pytest.approx(info["time"])
+
+
+@pytest.mark.parametrize("environment", [EidriveEnv, EidriveParallelEnv])
+def test_entry_with_the_last_tick_is_an_error(environment: type[EidriveEnv | EidriveParallelEnv]) -> None:
+    env = environment(visits(ADDED + DT))
+    with pytest.raises(SettingError, match="enters the world before the last tick"):
+        env.reset(seed=1)
 
 
 @pytest.mark.parametrize(("max_steps", "end_reason"), [(None, "stop trigger"), (40, "time limit")])
