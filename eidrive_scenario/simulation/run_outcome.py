@@ -11,6 +11,7 @@ from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.driving.stack import DrivingStack
 from eidrive_scenario.driving.station_warnings import MotionlessStations
 from eidrive_scenario.errors import ABORTED, FAILED, NOT_JUDGED, PASSED, Diagnostic, counted
+from eidrive_scenario.evaluation.criteria_parser import EXITS
 from eidrive_scenario.evaluation.criterion import CriteriaObserver, Criterion, Verdict, checked_metrics, checked_verdict
 from eidrive_scenario.evaluation.known_actors import FalseTracks
 from eidrive_scenario.openscenario import Scenario
@@ -165,8 +166,12 @@ def end_reason(state: RunState, storyboard: Storyboard, time: float, time_limit:
 
 
 def scheduled_end(storyboard: Storyboard, time: float, time_limit: float) -> str | None:
-    """Return the reason for which the storyboard or the time limit [s] ends a run at this time [s], or None."""
-    if storyboard.ended is not None:
+    """Return the reason for which the storyboard or the time limit [s] ends a run at this time [s], or None.
+
+    A run whose storyboard ends with an exit command continues for a tick, in which that command ends it.
+    """
+    exits = any(command.type in EXITS for command in storyboard.context.commands.custom)
+    if storyboard.ended is not None and not exits:
         return storyboard.ended
     return TIME_LIMIT if time >= time_limit - TIME_TOLERANCE else None
 

@@ -9,6 +9,17 @@ from typing import Any
 import pytest
 from command_fixtures import Eidrive
 from lxml import html
+from openscenario_xml import round_car_xml, scenario_xml
+from storyboard_xml import (
+    act_xml,
+    acts_xml,
+    condition_xml,
+    event_xml,
+    group_xml,
+    maneuver_xml,
+    time_xml,
+    trigger_xml,
+)
 
 from eidrive_scenario.api.run import (
     NOT_JUDGED,
@@ -79,6 +90,17 @@ def test_exit_command_judges_a_run(bare: Path, command: str, code: int) -> None:
     action = f'<UserDefinedAction><CustomCommandAction type="{command}"/></UserDefinedAction>'
     bare.write_text(bare.read_text().replace("<Actions>", f"<Actions>{action}", 1))
     assert run_file(bare).exit_code == code
+
+
+@pytest.mark.parametrize(("command", "code"), [("exitSuccess", 0), ("exitFailure", 1)])
+def test_exit_command_of_the_last_event_judges_a_run(command: str, code: int) -> None:
+    """The storyboard is complete in the time step in which this event executes the command."""
+    action = f'<UserDefinedAction><CustomCommandAction type="{command}"/></UserDefinedAction>'
+    event = event_xml("Exit", action, trigger_xml(condition_xml(time_xml(1.0, "greaterOrEqual"))))
+    story = acts_xml(act_xml(group_xml(maneuver_xml(event))))
+    scenario = scenario_xml(entities=round_car_xml("Ego"), story=story, stop="")
+    result = run_file(scenario, settings=RunSettings(criteria={"time_limit": {"within": 60}}))
+    assert (result.exit_code, result.end_reason) == (code, f"command: {command}")
 
 
 def test_command_exits_with_0_for_accepted_runs_only(eidrive: Eidrive, bare: Path) -> None:
