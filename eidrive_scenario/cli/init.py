@@ -15,6 +15,7 @@ import typer
 from eidrive_scenario.base.installation import requirement_source
 from eidrive_scenario.cli.output import echo
 from eidrive_scenario.errors import Diagnostic, SettingError
+from eidrive_scenario.files.bounded import absolute
 
 TEMPLATE = "project_template"
 """Folder of the template in the package. Files are written without the suffix `.template`."""
@@ -38,7 +39,7 @@ def init(
     """
     written: list[Path] = []
     try:
-        package = _package(folder.resolve().name)
+        package = _package(absolute(folder).name)
         if folder.exists() and any(path.name != ".git" for path in folder.iterdir()):
             raise SettingError(Diagnostic("the folder is not empty", "give a new folder", str(folder)))
         above = [path for path in (folder, *folder.parents) if not path.exists()]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, replace
@@ -311,7 +312,7 @@ class _Runs:
 
 def _with_suffixes(path: Path, suffixes: list[str]) -> Path:
     """Return the file of one run among several. All runs write to one device; `atomic_output` refuses a folder."""
-    if not suffixes or (path.exists() and not path.is_file()):
+    if not suffixes or (os.path.exists(path) and not os.path.isfile(path)):
         return path
     return path.with_stem("-".join([path.stem, *suffixes]))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
@@ -276,7 +277,7 @@ def report(
     if size is not None and figures is None:
         raise SettingError(Diagnostic("--size without --figures has no effect", "add --figures DIR"))
     if out is None:
-        out = runs[0] if runs[0].is_dir() else runs[0].parent
+        out = runs[0] if os.path.isdir(runs[0]) else runs[0].parent
     check_output_paths({"--out": out, "--figures": figures}, runs)
     page = report_files(
         runs,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -61,7 +62,7 @@ def folder_runs(locations: Sequence[Path], warn: Callable[[str], None]) -> list[
     """
     runs: list[StoredRun] = []
     for location in locations:
-        if not location.exists():
+        if not os.path.exists(location):
             raise SettingError(
                 Diagnostic("no such file or folder", "give a store or a folder of results", str(location))
             )

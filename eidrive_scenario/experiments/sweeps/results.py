@@ -97,7 +97,7 @@ def _result_key(run: StoredRun) -> tuple[Any, Any] | None:
 
 def _has_results(path: Path) -> bool:
     """Whether a path is a folder or a file of results, not a store."""
-    return path.is_dir() or path.suffix == ".json"
+    return os.path.isdir(path) or path.suffix == ".json"
 
 
 def runs_with_stores(paths: Sequence[Path]) -> Iterator[tuple[StoredRun, Path]]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from itertools import count
 from pathlib import Path
 from typing import Any, Self
@@ -113,7 +114,7 @@ class ResultStore:
         Raise SettingError if the file cannot be written, is not a store, or is one of other versions, or if another
         process writes it.
         """
-        if path.exists() and not path.is_file():
+        if os.path.exists(path) and not os.path.isfile(path):
             raise _error("cannot write: not a regular file", "choose another file", path)
         with ExitStack() as stack:
             try:
@@ -121,7 +122,7 @@ class ResultStore:
             except OSError as error:
                 raise _error(f"cannot write: {error.strerror}", "choose another file", path) from error
             stack.enter_context(exclusive(path))
-            is_new, store = not path.exists(), None
+            is_new, store = not os.path.exists(path), None
             try:
                 with _usable(path):
                     connection = _connect(path)
@@ -133,14 +134,15 @@ class ResultStore:
                 yield store
             except EidriveError:
                 if is_new and (store is None or not store.statuses()):
-                    path.unlink(missing_ok=True)
+                    with suppress(OSError):
+                        path.unlink()
                 raise
 
     @classmethod
     @contextmanager
     def read(cls, path: Path) -> Iterator[Self]:
         """Open a store for reading. Raise SettingError if there is none."""
-        if not path.is_file():
+        if not is_regular_file(path):
             hint = file_suggestion(path, {path.suffix, ".db"}, otherwise="give the file of a sweep")
             raise _error("no such store", hint, path)
         with ExitStack() as stack:

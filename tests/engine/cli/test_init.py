@@ -68,6 +68,12 @@ def test_folder_with_files_is_refused(eidrive: Eidrive, tmp_path: Path) -> None:
     assert eidrive("init", tmp_path / "notes.txt").exit_code == 2
 
 
+def test_loop_of_links_is_no_folder_of_project(eidrive: Eidrive, tmp_path: Path) -> None:
+    (tmp_path / "loop").symlink_to("loop")
+    done = eidrive("init", tmp_path / "loop")
+    assert (done.exit_code, "cannot write" in done.stderr) == (2, True), done.output
+
+
 def test_folder_with_git_only_becomes_project(eidrive: Eidrive, tmp_path: Path) -> None:
     (tmp_path / ".git").mkdir()
     assert eidrive("init", tmp_path).exit_code == 0

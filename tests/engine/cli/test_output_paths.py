@@ -136,6 +136,15 @@ def test_output_path_of_folder_is_invalid_input(
     assert "internal error" not in result.output
 
 
+@pytest.mark.parametrize(
+    "command", ["results {long}", "report {long}", "sweep {own} --store {long}", "run {own} --repeat 2 --csv {long}"]
+)
+def test_path_longer_than_file_names_is_invalid_input(eidrive: Eidrive, own: Path, command: str) -> None:
+    """Python raises OSError for the question whether such a path exists."""
+    result = eidrive(*command.format(own=own, long="x" * 300).split())
+    assert (result.exit_code, "aborted" in result.stderr) == (2, False), result.output
+
+
 def test_csv_of_two_runs_to_device_creates_no_file(eidrive: Eidrive, own: Path, tmp_path: Path) -> None:
     """The path is a link to /dev/null."""
     sink = tmp_path / "sink"
