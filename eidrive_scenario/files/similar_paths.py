@@ -64,7 +64,7 @@ def _names(folder: Path, suffixes: Collection[str]) -> list[str]:
             return sorted(
                 entry.name
                 for entry in islice(entries, _MOST_ENTRIES)
-                if (Path(entry.name).suffix in suffixes if suffixes else entry.is_dir())
+                if (Path(entry.name).suffix in suffixes and entry.is_file() if suffixes else entry.is_dir())
             )
     except (OSError, ValueError):
         return []

@@ -51,6 +51,12 @@ def test_file_suggestion_prefers_neighbors(given: str, expected: str) -> None:
     assert file_suggestion(given, (".xosc",), LIBRARY) == expected
 
 
+def test_file_suggestion_omits_broken_links_and_folders(folder: Path) -> None:
+    (folder / "lost.xosc").symlink_to("nowhere")
+    (folder / "loss.xosc").mkdir()
+    assert file_suggestion("lost.xosc", (".xosc",)) == "check the path"
+
+
 def test_file_suggestion_is_relative_to_the_folder_of_the_path(folder: Path) -> None:
     """A scenario names its channel file relative to its own folder."""
     inner = folder / "scenarios"
