@@ -164,7 +164,8 @@ def main() -> None:
         raise
     except OSError as error:
         # Help and usage errors are printed before a command runs.
-        print_error(error)
+        with suppress(OSError):  # Standard error is full, too
+            print_error(error)
         with suppress(OSError):
             flush_output()
         raise SystemExit(ABORTED) from error

@@ -143,6 +143,15 @@ def test_full_disk_is_reported_in_one_line(passing_by: Path, arguments: list[str
 
 
 @pytest.mark.process
+@pytest.mark.skipif(not FULL.exists(), reason="this system has no /dev/full")
+def test_full_standard_error_is_no_failed_criterion() -> None:
+    """An exception without a handler would end with the exit code 1."""
+    with FULL.open("wb") as full:
+        command = [sys.executable, "-m", "eidrive_scenario", "judge", "missing"]
+        assert subprocess.run(command, stderr=full, check=False).returncode == 3
+
+
+@pytest.mark.process
 @pytest.mark.parametrize("arguments", [["run", "FILE", "--json"], ["tree", "FILE"]])
 def test_closed_standard_output_is_not_an_error(passing_by: Path, arguments: list[str]) -> None:
     given = " ".join(f"'{passing_by}'" if argument == "FILE" else argument for argument in arguments)
