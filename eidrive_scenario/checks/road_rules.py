@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -87,6 +88,8 @@ ROAD_FILE_RULES: tuple[Rule[RoadNetwork], ...] = (
 
 LENGTH_TOLERANCE = 0.01
 """Maximum rounding error of the length of a road in its file [m]."""
+_LANE_ID = re.compile(r"-?\d{1,10}")
+"""Pattern of an integer of 32 bits. Python refuses to convert thousands of digits."""
 _ADDRESS = "="
 """Part of signal references of ScenarioRunner, such as `pos=x,y` or `id=7`."""
 
@@ -114,7 +117,7 @@ def unknown_lanes(context: RoadLintContext) -> Iterator[Diagnostic]:
     lanes = {number for road in context.roads.roads.values() for part in road.sections for number in part.lanes} - {0}
     for action in context.of(model.LaneChangeAction):
         target = action.lane_change_target.absolute_target_lane
-        if target is None or not target.value.removeprefix("-").isdecimal():
+        if target is None or not _LANE_ID.fullmatch(target.value):
             continue  # Other texts are errors of the run setup.
         if int(target.value) not in lanes:
             shown = ", ".join(str(lane) for lane in sorted(lanes))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +34,8 @@ from eidrive_scenario.api.common import EPSILON, LaneLocation, Pose, ScenarioErr
 
 SPACING = 2.0
 """Spacing of the points of a path [m]."""
+_LANE_ID = re.compile(r"-?\d{1,10}")
+"""Pattern of an integer of 32 bits. Python refuses to convert thousands of digits."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,7 @@ class LaneChangeAction(ActionBehaviour):
         self._dynamics = self.action.lane_change_action_dynamics
         self._transition = TransitionProfile(model.DynamicsShape.STEP, 0.0, 0.0, 0.0)
         target = self.action.lane_change_target.absolute_target_lane
-        if target is not None and not target.value.removeprefix("-").isdecimal():
+        if target is not None and not _LANE_ID.fullmatch(target.value):
             raise self.error(f"the target lane is not a number (got {target.value!r}; expected the id of a lane)")
         self._roads = self.require_roads()
         self._lane = 0

@@ -8,7 +8,7 @@ from itertools import combinations
 from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.checks.rule import at
 from eidrive_scenario.checks.scenario_rules.context import LintContext
-from eidrive_scenario.checks.scenario_rules.states import has_zero_rate, is_immediate
+from eidrive_scenario.checks.scenario_rules.states import has_zero_rate, is_immediate, never_ends
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import model
 
@@ -45,7 +45,10 @@ def _domains(action: model.Action) -> set[str]:
     """Return the control domains of a private action that has a duration."""
     elements = () if action.private_action is None else action.private_action.walk()
     leaf = next((element for element in elements if type(element) in _DOMAINS), None)
-    if leaf is None or any(isinstance(part, model.TransitionDynamics) and is_immediate(part) for part in leaf.walk()):
+    if leaf is None:
+        return set()
+    transitions = (part for part in leaf.walk() if isinstance(part, model.TransitionDynamics))
+    if any(map(is_immediate, transitions)) and not never_ends(action):
         return set()
     domains = {_DOMAINS[type(leaf)]}
     if isinstance(leaf, model.FollowTrajectoryAction) and leaf.time_reference.timing is not None:
@@ -58,7 +61,7 @@ def speeds_above_max(context: LintContext) -> Iterator[Diagnostic]:
     for action, actors in context.performances:
         for element in action.walk():
             speed = _speed(element)
-            if speed is None:
+            if speed is None or _is_relative(action):
                 continue
             for name in actors:
                 entity = context.scenario.entities.get(name)
@@ -75,6 +78,12 @@ def _speed(element: model.Element) -> float | None:
     if isinstance(element, model.AbsoluteTargetSpeed | model.AbsoluteSpeed):
         return element.value
     return element.speed if isinstance(element, model.SpeedProfileEntry) else None
+
+
+def _is_relative(action: model.PrivateAction) -> bool:
+    """Whether the speeds of an action are differences from the speed of another entity."""
+    profiles = (part for part in action.walk() if isinstance(part, model.SpeedProfileAction))
+    return any(profile.entity_ref is not None or profile.entity_ref_element is not None for profile in profiles)
 
 
 def zero_rate_transitions(context: LintContext) -> Iterator[Diagnostic]:

@@ -25,7 +25,7 @@ from storyboard_xml import (
 )
 
 from eidrive_scenario.checks.rule import Level
-from eidrive_scenario.checks.scenario_checks import ALL_RULES, run_rules
+from eidrive_scenario.checks.scenario_checks import ALL_RULES, check_scenario, run_rules
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.openscenario import load_scenario
 
@@ -189,11 +189,39 @@ def test_above_max_speed_applies_to_negative_speeds(folder: Path) -> None:
     assert "above-max-speed" not in violated_rules(folder, speed_xml(-60, 2))
 
 
+def test_above_max_speed_omits_profiles_relative_to_an_entity(folder: Path) -> None:
+    """Behind an entity at 80 m/s, a difference of -70 m/s is a speed of 10 m/s."""
+    entries = '<SpeedProfileEntry time="2" speed="-70"/></SpeedProfileAction></LongitudinalAction></PrivateAction>'
+    action = "<PrivateAction><LongitudinalAction><SpeedProfileAction {} followingMode='position'>" + entries
+    assert "above-max-speed" in violated_rules(folder, action.format(""))
+    assert "above-max-speed" not in violated_rules(folder, action.format('entityRef="Other"'))
+
+
+def test_conflicting_actions_include_continuous_steps(folder: Path) -> None:
+    """A step to a relative speed with `continuous` controls the speed until another action ends it."""
+    example = EXAMPLES["conflicting-actions"][1]
+    example = re.sub(
+        'Shape="linear" dynamicsDimension="time" value="2"', 'Shape="step" dynamicsDimension="time" value="0"', example
+    )
+    target = '<RelativeTargetSpeed entityRef="Other" value="0" speedTargetValueType="delta" continuous="{}"/>'
+    for continuous in ("true", "false"):
+        event = example.replace('<AbsoluteTargetSpeed value="5"/>', target.format(continuous))
+        assert ("conflicting-actions" in violated_rules(folder, event)) == (continuous == "true")
+
+
 @pytest.mark.parametrize("lane", ["-1", "-01", "-2"])
 def test_unknown_lane_compares_numbers(folder: Path, lane: str) -> None:
     example = re.sub(r'(<AbsoluteTargetLane value=)"[^"]*"', rf'\1"{lane}"', EXAMPLES["unknown-lane"][1])
     assert f'value="{lane}"' in example
     assert ("unknown-lane" in violated_rules(folder, example)) == (lane == "-2")
+
+
+def test_lane_of_thousands_of_digits_is_an_error_of_the_setup(folder: Path) -> None:
+    """Python converts at most 4300 digits."""
+    example = re.sub(r'(<AbsoluteTargetLane value=)"[^"]*"', rf'\1"{"9" * 5000}"', EXAMPLES["unknown-lane"][1])
+    assert diagnostics_of(folder, example) == []
+    (error,) = check_scenario(folder / "scenario.xosc").errors
+    assert error.message.startswith("LaneChangeAction: the target lane is not a number")
 
 
 @pytest.mark.parametrize("turned", ["waypoint", "actor", ""])
