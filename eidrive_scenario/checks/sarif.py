@@ -33,7 +33,7 @@ def write_sarif(
 
     diagnostics  of all files, each once
     folder       folder of the command; paths of files below it are relative to it
-    aborted      messages of checks that an error or the wall limit ended
+    aborted      files and messages of checks that an error or the wall limit ended
     """
     with write_atomically(out) as stream:
         stream.write(json.dumps(_log(diagnostics, folder, aborted), indent=1).encode())

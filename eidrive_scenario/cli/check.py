@@ -58,7 +58,7 @@ def check(
         check_seconds("--wall-limit", wall_limit)
         supervise(wall_limit, report_hang, what="check")
     missing: list[Diagnostic] = []
-    aborted: list[BaseException] = []
+    aborted: list[str] = []
     files, ignored = list(_files(paths, missing)), tuple(ignore or ())
     check_output_paths({"--sarif": sarif}, files)
     printed: dict[str, dict[Diagnostic, None]] = {"error": dict.fromkeys(missing), "warning": {}, "note": {}}
@@ -74,7 +74,7 @@ def check(
             if context.find_root().params.get("traceback"):
                 raise
             print_error(error, "check", path)
-            aborted.append(error)
+            aborted.append(f"{path}: {error}")
             continue
         for level, reported in zip(printed, (report.errors, report.warnings, report.notes), strict=True):
             diagnostics = [diagnostic_with_option_names(diagnostic, _NAMES) for diagnostic in reported]
@@ -97,13 +97,13 @@ def check(
     raise typer.Exit(INVALID_INPUT if printed["error"] or (strict and printed["warning"]) else 0)
 
 
-def _write_sarif(out: Path, printed: Mapping[str, Iterable[Diagnostic]], aborted: Sequence[BaseException]) -> None:
+def _write_sarif(out: Path, printed: Mapping[str, Iterable[Diagnostic]], aborted: Sequence[str]) -> None:
     """Write the printed diagnostics, and the errors of checks that were aborted, as a SARIF log."""
     from eidrive_scenario.checks.rule import Level
     from eidrive_scenario.checks.sarif import write_sarif
 
     diagnostics = [(Level(level), diagnostic) for level, several in printed.items() for diagnostic in several]
-    write_sarif(diagnostics, out, folder=Path.cwd(), aborted=[str(error) for error in aborted])
+    write_sarif(diagnostics, out, folder=Path.cwd(), aborted=aborted)
 
 
 def _check_file(path: Path, ignored: tuple[str, ...], settings: RunSettings, wall_limit: float | None) -> CheckReport:

@@ -11,6 +11,8 @@ import pytest
 from command_fixtures import Eidrive
 
 from eidrive_scenario.checks.scenario_checks import ALL_RULES
+from eidrive_scenario.cli import check
+from eidrive_scenario.errors import WallLimitError
 
 BROKEN = 'dynamicsShape="stp"'
 UNUSED = '<ParameterDeclarations>\n   <ParameterDeclaration name="Größe" parameterType="double" value="1"/>'
@@ -35,6 +37,20 @@ def folder(tmp_path: Path, passing_by: Path, monkeypatch: pytest.MonkeyPatch) ->
     (below / "b.xosc").write_text(text.replace("<ParameterDeclarations>", UNUSED, 1), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+def test_notification_of_aborted_check_has_its_file(
+    eidrive: Eidrive, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def reach_limit(*_: object) -> None:
+        raise WallLimitError(5.0)
+
+    monkeypatch.setattr(check, "_check_file", reach_limit)
+    assert eidrive("check", "my scenarios", "--sarif", "log").exit_code == 3
+    (invocation,) = run_of(folder / "log")["invocations"]
+    texts = [notification["message"]["text"] for notification in invocation["toolExecutionNotifications"]]
+    message = "not finished after 5 s of wall time (the wall limit)"
+    assert texts == [f"my scenarios/größe/{name}.xosc: {message}" for name in ("a#1", "b")]
 
 
 def test_results_have_rule_level_address_and_columns(eidrive: Eidrive, folder: Path) -> None:
