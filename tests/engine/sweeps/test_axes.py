@@ -44,6 +44,12 @@ def test_parse_axis_with_invalid_text_raises(text: str) -> None:
         parse_axis(text)
 
 
+@pytest.mark.parametrize("values", ["0:1e999999:1e-999999", "1e400:2e400", "0:1e-400:1e-401"])
+def test_parse_axis_with_numbers_that_no_float_holds_raises(values: str) -> None:
+    with pytest.raises(SettingError, match="a number is beyond the range of floats"):
+        parse_axis(f"Speed={values}")
+
+
 @pytest.mark.parametrize("values", ["0..1", "0...1", "0.1..0.5", "0 … 1", "0 to 1", "0:1:0.1:2", "0:", ":1", "0:1,3"])
 def test_values_that_resemble_a_range_name_its_form(values: str) -> None:
     with pytest.raises(SettingError, match="write a range as Latency=LOW:HIGH:STEP, an interval as Latency=LOW:HIGH"):
