@@ -233,7 +233,7 @@ def heat_cells(
 
 def _mark_values(axes: Axes, axis: Axis, values: Sequence[float]) -> None:
     """Put ticks at the measured values: all of them, or equal steps of their order in too little space."""
-    labels = [f"{value:.4g}" for value in values]
+    labels = number_texts(values, 4)
     points = float(FontProperties(size=axis.get_tick_params().get("labelsize")).get_size_in_points())
     width, height = 72.0 / axes.figure.dpi * np.array(axes.figure.bbox.size) * axes.get_position().size
     across = axis is axes.xaxis
@@ -241,6 +241,12 @@ def _mark_values(axes: Axes, axis: Axis, values: Sequence[float]) -> None:
     step = max(1, math.ceil(len(values) * needed / (width if across else height)))
     axis.set_major_locator(FixedLocator(values[::step]))
     axis.set_major_formatter(FixedFormatter(labels[::step]))
+
+
+def number_texts(values: Sequence[float], digits: int) -> list[str]:
+    """Return different numbers as texts: with these significant digits, or with as many as distinguish them."""
+    several = ([f"{value:.{count}g}" for value in values] for count in range(digits, 18))
+    return next((texts for texts in several if len(set(texts)) == len(values)), list(map(repr, values)))
 
 
 def cell_edges(values: Sequence[float]) -> Array:

@@ -18,6 +18,7 @@ from eidrive_scenario.reporting.drawing.charts import (
     ChartSeries,
     MapAxis,
     line_chart,
+    number_texts,
     rate_figure,
     rate_map,
     rate_map_figure,
@@ -60,13 +61,14 @@ def levels_of(runs: Sequence[ReportedRun], name: str) -> Levels | None:
         return None
     if len(numbers) <= MOST_VALUES:
         ordered = sorted(numbers)
-        texts = tuple(str(value) if isinstance(value, int) else f"{value:.6g}" for value in ordered)
+        given = zip(ordered, number_texts(ordered, 6), strict=True)
+        texts = tuple(str(value) if isinstance(value, int) else text for value, text in given)
         return Levels(name, tuple(map(float, ordered)), texts)
     start, end = float(min(numbers)), float(max(numbers))
     width = (end - start) / RANGES
     ends = [start + width * index for index in range(RANGES + 1)]
     centers = tuple((low + high) / 2.0 for low, high in pairwise(ends))
-    labels = tuple(f"{low:.3g} … {high:.3g}" for low, high in pairwise(ends))
+    labels = tuple(map(" … ".join, pairwise(number_texts(ends, 3))))
     return Levels(name, centers, labels, start, width)
 
 

@@ -85,6 +85,20 @@ def test_parameter_matrix_sorts_values_as_numbers() -> None:
     assert [[cell and cell.share for cell in cells] for _, cells in matrix.rows] == [[1.0, 0.0], [1.0, 0.0]]
 
 
+def test_parameter_matrix_distinguishes_large_numbers_of_small_differences() -> None:
+    """Coordinates of a map projection: single ones that differ in the seventh digit, and ranges of 1 m."""
+    single = [run("a", "ideal", n, n % 2 == 0, X=str(5812345.25 + n % 2)) for n in range(4)]
+    matrix = parameter_matrix(single, ("X",))
+    assert matrix is not None
+    assert matrix.columns == ("5812345", "5812346")
+    assert [cell and cell.successes for cell in matrix.rows[0][1]] == [2, 0]
+    many = [run("a", "ideal", n, True, X=str(5812345 + n % 41 / 4)) for n in range(82)]
+    matrix = parameter_matrix(many, ("X",))
+    assert matrix is not None
+    assert matrix.columns[:2] == ("5812345 … 5812346", "5812346 … 5812347")
+    assert [cell and cell.trials for cell in matrix.rows[0][1]] == [8] * 9 + [10]
+
+
 def test_drawn_parameters_have_no_matrix() -> None:
     runs = [run("a", "ideal", index, True, Speed=str(index + 0.5)) for index in range(6)]
     assert parameter_matrix(runs, ("Speed",)) is None
