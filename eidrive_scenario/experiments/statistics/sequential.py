@@ -35,9 +35,12 @@ class RatioTest:
     """Sequential probability ratio test of a success rate (Wald, Sequential analysis, 1947).
 
     good, bad         rates with bad < good, both within (0, 1): the test should pass at the first, fail at the second
-    false_pass        maximum probability to pass at a rate of `bad` or below
-    false_failure     maximum probability to fail at a rate of `good` or above
-    limit             maximum number of runs, after which the test is undecided; both probabilities stay valid
+    false_pass        nominal probability to pass at a rate of `bad` or below
+    false_failure     nominal probability to fail at a rate of `good` or above
+    limit             maximum number of runs, after which the test is undecided; both probabilities do not increase
+
+    By Wald's bounds the probability to pass is at most false_pass / (1 - false_failure), that to fail at most
+    false_failure / (1 - false_pass), and their sum at most that of the nominal ones; `characteristics` returns them.
 
     Between both rates either decision is possible. The logarithm of the likelihood ratio of both rates changes by a
     constant with each success and each failure; the test ends when it leaves an interval. Raise ValueError for rates,
@@ -124,7 +127,8 @@ def success_rate(
 ) -> RatioTest:
     """Return the test that the success rate of a stochastic scenario is at least a required one.
 
-    A pass is wrong, and a failure is wrong at a rate of `expected`, with a probability of at most 1 - confidence.
+    A pass is wrong, and a failure is wrong at a rate of `expected`, with a probability of about 1 - confidence, at most
+    (1 - confidence) / confidence.
     `expected` is the rate of a system that should pass; the default is half of the permitted failures. The nearer it is
     to the required rate, the more runs are needed. Raise ValueError as `RatioTest`, and for a rate or confidence out
     of range.
