@@ -16,6 +16,8 @@ from eidrive_reports.reproduction.parts import ALL, PARTS, selected_detectors, s
 from eidrive_reports.reproduction.provenance import job_digest
 from eidrive_reports.reproduction.reproduce import Record
 from known_episodes import episode
+from opendrive_xml import map_xml, road_xml
+from openscenario_xml import road_file_xml, scenario_xml
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.simulation import RunSettings
@@ -83,6 +85,17 @@ def test_digest_distinguishes_settings_and_scenarios() -> None:
     }
     assert len(digests) == 4
     assert job_digest("coop/scenario_1", RunSettings()) in digests
+
+
+def test_digest_changes_with_the_road_file_of_a_scenario_of_a_user(tmp_path: Path) -> None:
+    digests = set()
+    for number, length in enumerate((300.0, 200.0, 300.0)):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        (folder / "road.xodr").write_text(map_xml(road_xml(length=length)))
+        (folder / "own.xosc").write_bytes(scenario_xml(road=road_file_xml("road.xodr")))
+        digests.add(job_digest(str(folder / "own.xosc"), RunSettings()))
+    assert len(digests) == 2
 
 
 def test_counter_counts_objects_after_fusion_while_the_station_is_present() -> None:

@@ -26,7 +26,7 @@ from eidrive_scenario.api.experiments import (
     resolve_scenario,
     sha256_of,
 )
-from eidrive_scenario.api.run import RunSettings
+from eidrive_scenario.api.run import RunSettings, load_scenario
 
 PACKAGES = ("eidrive_scenario", "eidrive_behaviors", "eidrive_criteria")
 """Packages of this project whose code a run executes."""
@@ -115,7 +115,11 @@ def _measurement_digest() -> str:
 
 @cache
 def _scenario_digest(scenario: str) -> str:
-    return sha256_of(resolve_scenario(scenario).read_bytes())
+    """Return the digest of a scenario, its road file and its catalogs, which need not be in the library."""
+    path = resolve_scenario(scenario)
+    loaded = load_scenario(path)
+    road = "" if loaded.road_file is None else sha256_of(loaded.road_file.read_bytes())
+    return sha256_of(canonical_json([sha256_of(path.read_bytes()), road, *loaded.catalogs.values()]).encode())
 
 
 def _version(name: str) -> str:
