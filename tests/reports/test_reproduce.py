@@ -104,6 +104,7 @@ def test_unwritable_folder_ends_with_exit_code_2(eidrive: Eidrive, tmp_path: Pat
         ("table3.jsonl", b'{"scenario": "coop/scenario_5"}\n', "table3.jsonl:1: the record is damaged"),
         ("provenance.json", b"[1]", "provenance.json: the file is damaged: not a JSON object; remove it"),
         ("provenance.json", b"{", "provenance.json: the file is damaged"),
+        ("provenance.json", b'{"table2": 1}', "provenance.json: the file is damaged"),
     ],
 )
 def test_damaged_file_ends_with_exit_code_2_before_the_runs(

@@ -145,7 +145,7 @@ def read_provenance(out: Path) -> dict[str, Any]:
         origins = load_json(path.read_bytes())
     except ValueError as error:
         raise SettingError(Diagnostic(f"the file is damaged: {error}", "remove it", str(path))) from error
-    if not isinstance(origins, dict):
+    if not isinstance(origins, dict) or not all(isinstance(origin, dict) for origin in origins.values()):
         raise SettingError(Diagnostic("the file is damaged: not a JSON object", "remove it", str(path)))
     return origins
 
@@ -167,8 +167,8 @@ def write_provenance(
         "last_call_s": round(elapsed_s, 1),
         "processes": processes,
     }
-    former = origins.get(part)
-    if not added and isinstance(former, dict) and former.get("code") == code["code"]:
+    former = origins.get(part, {})
+    if not added and former.get("code") == code["code"]:
         call = {name: former.get(name) for name in call}
     parts = {**origins, part: {**code, **call, **values}}
     with write_atomically(out / FILE) as stream:
