@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 from eidrive_reports.reproduction import channels
 from eidrive_reports.reproduction.channel_load import CLEAR, INNER, OUTER, places, with_load
 from eidrive_reports.reproduction.episodes import Episode, EpisodeJob, run_episode
+from eidrive_reports.reproduction.figures import channels_figure
 from eidrive_reports.reproduction.part import Case
 from eidrive_reports.reproduction.provenance import job_digest
 from eidrive_reports.reproduction.reproduce import Record
@@ -57,6 +59,18 @@ def test_infinite_ages_have_no_value() -> None:
     assert channels.outcome(runs)["age"] is None
     assert channels.outcome(some)["age"] == 0.2
     assert channels.outcome(some)["reception"] == 0.0
+
+
+def test_infinite_ages_of_a_loaded_channel_are_a_gap_of_the_curve() -> None:
+    lost = {"collision.count": 0.0, "packet_reception_ratio": 0.0, "channel_busy_ratio.Ego": 0.9}
+    episodes = [
+        episode(one.scenario, one.arm, one.seed, **lost) if one.arm.endswith(" 200") else one
+        for one in known_episodes()
+    ]
+    report = channels.report(episodes, channels.DETECTORS)
+    assert "the mean age of information from 0.100 s to infinity" in report.markdown()
+    ages = channels_figure(report.data()).axes[-2].lines[0].get_ydata()
+    assert np.asarray(ages) == pytest.approx([0.1, 0.1, 0.1, 0.1, np.nan], nan_ok=True)
 
 
 def test_runs_of_one_arm_have_different_seeds() -> None:

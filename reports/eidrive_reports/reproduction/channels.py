@@ -113,8 +113,13 @@ def _load(rows: Sequence[Row]) -> str:
         f"{first['access']}: from {first['stations']} to {last['stations']} stations the channel busy ratio rises from "
         f"{first['busy']:.0%} to {last['busy']:.0%}, the received share of the messages of the roadside unit changes "
         f"from {first['reception']:.0%} to {last['reception']:.0%}, the mean age of information from "
-        f"{first['age']:.3f} s to {last['age']:.3f} s, and success from {first['share']:.0%} to {last['share']:.0%}."
+        f"{_age(first)} to {_age(last)}, and success from {first['share']:.0%} to {last['share']:.0%}."
     )
+
+
+def _age(row: Row) -> str:
+    """Return the mean age of information as text; it is infinite if most runs receive no message."""
+    return "infinity" if row["age"] is None else f"{row['age']:.3f} s"
 
 
 BLOCKS: Mapping[tuple[str, str], int] = {

@@ -147,8 +147,8 @@ def number(row: Row, name: str) -> float:
 
 
 def numbers(rows: Iterable[Row], name: str) -> list[float]:
-    """Return a field of rows as numbers; 0 where it is empty."""
-    return [number(row, name) for row in rows]
+    """Return a field of rows as numbers; NaN where it is empty, so that figures have a gap there."""
+    return [math.nan if row[name] is None else float(row[name]) for row in rows]
 
 
 def where(rows: Iterable[Row], **fields: object) -> list[Row]:
@@ -167,8 +167,11 @@ def bounds(interval: Any) -> dict[str, float | None]:
 
 
 def limits(rows: Sequence[Row], name: str) -> tuple[list[float], list[float]]:
-    """Return the limits of the intervals of a field; the value itself where there is none."""
-    below, above = ([number(row, name if row[end] is None else end) for row in rows] for end in ("low", "high"))
+    """Return the limits of the intervals of a field; the value itself where there is none, NaN without a value."""
+    below, above = (
+        [number for row in rows for number in numbers([row], name if row[end] is None else end)]
+        for end in ("low", "high")
+    )
     return below, above
 
 
