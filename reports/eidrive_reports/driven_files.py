@@ -21,7 +21,15 @@ import numpy as np
 from rich.console import Console
 
 from eidrive_reports.driven_runs import DEFAULT, REFERENCE, STACK, DrivenRun, case_of, jobs_of_file, run_recorded
-from eidrive_reports.studies import command, group_by, markdown_table, positive, publish, study_options
+from eidrive_reports.studies import (
+    check_different,
+    command,
+    group_by,
+    markdown_table,
+    positive,
+    publish,
+    study_options,
+)
 from eidrive_scenario.api.actions import is_agent_controller
 from eidrive_scenario.api.common import Diagnostic, InputError, quoted, registry, suggestion
 from eidrive_scenario.api.experiments import definition
@@ -116,9 +124,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     name, separator, model = (options.reference or "").partition("=")
     if options.reference and not (name and separator and model):
         parser.error("--reference: expected CONTROLLER=MODEL, for example ALKSController=alks")
-    names = [path.name for path in options.files]
-    if (twice := next((name for name in names if names.count(name) > 1), None)) is not None:
-        parser.error(f"two files have the name {twice}: the table and the record have one entry per name")
+    check_different(parser, [path.name for path in options.files])
     if options.reference and (wrong := wrong_reference(options.files, name, model)) is not None:
         parser.error(str(wrong))
     reference = {name: model} if options.reference else None

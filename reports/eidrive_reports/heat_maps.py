@@ -19,7 +19,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from eidrive_reports.studies import command, study_options
+from eidrive_reports.studies import check_different, command, study_options
 from eidrive_scenario.api.common import Diagnostic, SettingError, quoted
 from eidrive_scenario.api.experiments import Job, from_library, run_jobs
 from eidrive_scenario.api.pages import heat_cells, write_figure
@@ -160,6 +160,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     invalid = [text for text in options.param if "=" not in text]
     if invalid:
         parser.error(f"--param: not NAME=VALUE (got {invalid[0]!r})")
+    check_different(parser, [Path(name).stem for name in options.distributions])
     parameters = dict(text.split("=", 1) for text in options.param)
     for name in options.distributions:
         grid = run_outcome_grid(

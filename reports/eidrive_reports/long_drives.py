@@ -22,7 +22,7 @@ from rich.console import Console
 
 from eidrive_reports.driven_runs import CONTACT, Stop, observed_run
 from eidrive_reports.paper import EGO
-from eidrive_reports.studies import command, markdown_table, publish, study_options
+from eidrive_reports.studies import check_different, command, markdown_table, publish, study_options
 from eidrive_scenario.api.common import (
     Diagnostic,
     LaneKey,
@@ -414,6 +414,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--minutes", type=minutes, default=10.0, help="approximate duration of a drive")
     parser.add_argument("--planner", default="behavior")
     options = study_options(parser, arguments, seeds=1)
+    check_different(parser, [road_map.stem for road_map in options.maps])
     jobs = _jobs(options, options.out / "long_drives")
     drives = run_jobs(jobs, run_of, workers=options.workers, console=Console(stderr=True), title="long drives")
     publish(table(drives[::2], drives[1::2]), options.out / "long_drives.md")

@@ -26,6 +26,7 @@ from eidrive_reports.paper import EGO
 from eidrive_reports.studies import command, group_by, markdown_table, publish, study_options
 from eidrive_scenario.api.common import generator, write_atomically
 from eidrive_scenario.api.experiments import Job, run_jobs
+from eidrive_scenario.api.pages import write_figure
 from eidrive_scenario.api.run import RunSettings, Simulation
 
 ROAD = 1800.0
@@ -344,7 +345,7 @@ def draw(runs: Sequence[OvertakingRun], path: Path) -> None:
     axes.set_ylabel("share of accepted gaps")
     axes.set_xticks(GAPS)
     figure.legend(loc="outside upper center", ncols=3, fontsize="small")
-    figure.savefig(path, dpi=150)
+    write_figure(figure, path, 150)
 
 
 @command

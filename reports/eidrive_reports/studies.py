@@ -42,6 +42,12 @@ def positive(text: str) -> int:
     return int(text)
 
 
+def check_different(parser: argparse.ArgumentParser, names: Sequence[str]) -> None:
+    """End with an error of the options if two files have one name, as each result is named after its file."""
+    if (twice := next((name for name in names if names.count(name) > 1), None)) is not None:
+        parser.error(f"two files have the name {twice}: the results have one entry per name")
+
+
 class Command(Protocol):
     def __call__(self, arguments: Sequence[str] | None = None) -> int: ...
 

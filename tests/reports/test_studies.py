@@ -50,3 +50,24 @@ def test_error_of_an_output_is_a_message_and_exit_code_2(
     few = ["--seeds", "1", *(["--drives", "0"] if study == "overtaking" else [])]
     assert module.main(["--out", str(tmp_path), *few]) == 2
     assert f"{study}.md: cannot write" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("study", "suffix"), [("long_drives", "xodr"), ("heat_maps", "xosc")])
+def test_files_of_one_name_in_two_folders_are_an_error(
+    study: str, suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The results of the second one would replace those of the first."""
+    names = [str(tmp_path / folder / f"x.{suffix}") for folder in "ab"]
+    with pytest.raises(SystemExit):
+        importlib.import_module(f"eidrive_reports.{study}").main([*names, "--out", str(tmp_path)])
+    assert "two files have the name x" in capsys.readouterr().err
+
+
+def test_overtaking_creates_the_folder_of_its_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = importlib.import_module("eidrive_reports.overtaking")
+    monkeypatch.setattr(module, "run_jobs", lambda *jobs, **options: [])
+    figures = tmp_path / "new" / "figures"
+    options = ["--seeds", "1", "--drives", "0", "--out", str(tmp_path), "--figures", str(figures)]
+    assert module.main(options) == 0
+    assert (figures / "overtaking.png").read_bytes()[1:4] == b"PNG"
+    assert (tmp_path / "overtaking.md").is_file()
