@@ -188,7 +188,7 @@ class Visuals:
         if self._buildings is not None:
             glowing = {"window_lit": WINDOW_LIGHT} if weather.lamps_on and weather.sun_elevation < 3.0 else {}
             standing.insert(0, MeshInstance(self._buildings, np.eye(3), self._origin, -1, glowing))
-        subjects = Subjects(self._ground, standing, actors, ignored, self._decks)
+        subjects = Subjects(self._ground_around(pose[:2, 3]), standing, actors, ignored, self._decks)
         content = ImageContent(subjects, beams, weather, pose, pinhole, self._road_below(*pose[:3, 3].tolist()))
         return SceneImage(self._renderer, content)
 
@@ -203,6 +203,13 @@ class Visuals:
             below = [pose for pose in map(roads.pose, roads.locations_at(x, y)) if pose.z <= z]
             pose = max(below, key=lambda pose: pose.z, default=pose)
         return RoadPlane(pose.z, rotation_matrix(pose.h, pose.p, pose.r)[:, 2])
+
+    def _ground_around(self, camera: Array) -> list[MeshInstance]:
+        """Return the ground for a camera at a position (2,): the land follows a camera that is beyond the roads."""
+        land, *roads = self._ground
+        offset, roads_half = camera - land.center[:2], land.model.half[:2] - BESIDE_ROADS
+        beyond = offset - np.clip(offset, -roads_half, roads_half)
+        return [replace(land, position=land.position + np.append(beyond, 0.0)), *roads]
 
     def _ground_parts(self) -> list[MeshInstance]:
         """Return roads with markings, and their undersides unless they are level, and surrounding land; split by a

@@ -245,6 +245,12 @@ def test_wet_road_reflects_a_bright_wall(world: World) -> None:
     assert wet[0] / wet[1] > 1.5 * dry[0] / dry[1]
 
 
+def test_ground_without_roads_surrounds_distant_cameras(world: World) -> None:
+    near, distant = (world.radiance(looking(0.4, x=x, y=y), PINHOLE).depth for x, y in ((0.0, 0.0), (3e4, -8192.0)))
+    assert np.isfinite(near[60:]).all()
+    np.testing.assert_array_equal(distant, near)
+
+
 def test_depth_beyond_far_plane_is_infinite(world: World) -> None:
     seen = world.radiance(looking(0.0), Pinhole.of_fov(160, 120, math.radians(80), 0.1, 30.0))
     finite = np.isfinite(seen.depth)
