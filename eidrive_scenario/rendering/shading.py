@@ -241,7 +241,8 @@ def _single(color: Array) -> Floats:
     return single
 
 
-_ROW = 256
+_ROW = 2048
+"""Width of the image of directions for OpenCV, which has at most 32,766 lines."""
 
 
 def sampled(sky: Floats, x: Floats, y: Floats, z: Floats) -> Floats:

@@ -12,6 +12,7 @@ from eidrive_scenario.rendering import picture_maker
 from eidrive_scenario.rendering.daylight import SIZE, daylight, dome, horizon
 from eidrive_scenario.rendering.lamps import ABOVE_CUT_OFF, LOW_BEAM, intensity
 from eidrive_scenario.rendering.rasterization import rasterize
+from eidrive_scenario.rendering.shading import sampled
 from eidrive_scenario.rendering.tone_mapping import LUMA
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Placement
@@ -249,6 +250,12 @@ def test_ground_without_roads_surrounds_distant_cameras(world: World) -> None:
     near, distant = (world.radiance(looking(0.4, x=x, y=y), PINHOLE).depth for x, y in ((0.0, 0.0), (3e4, -8192.0)))
     assert np.isfinite(near[60:]).all()
     np.testing.assert_array_equal(distant, near)
+
+
+def test_sky_is_sampled_in_directions_of_ten_million_pixels() -> None:
+    sky, level, up = dome(Weather()), np.zeros(10_000_000, np.float32), np.ones(10_000_000, np.float32)
+    zenith = sky[SIZE // 2 - 1 : SIZE // 2 + 1, SIZE // 2 - 1 : SIZE // 2 + 1].mean(axis=(0, 1))
+    np.testing.assert_allclose(sampled(sky, level, level, up)[-1], zenith, rtol=1e-5)
 
 
 def test_depth_beyond_far_plane_is_infinite(world: World) -> None:
