@@ -127,9 +127,10 @@ def _add_grain(
         if grain[kind] == 0.0:
             continue
         x, y = places[0, row] + camera[0], places[1, row] + camera[1]
-        wide = patches[int(y * np.float32(4.0)) & mask, int(x * np.float32(4.0)) & mask] * np.float32(0.35)
-        fine = grit[int(y * np.float32(24.0)) & mask, int(x * np.float32(24.0)) & mask]
+        wide = patches[int(np.floor(y * np.float32(4.0))) & mask, int(np.floor(x * np.float32(4.0))) & mask]
+        fine = grit[int(np.floor(y * np.float32(24.0))) & mask, int(np.floor(x * np.float32(24.0))) & mask]
         fine *= np.float32(4.0) / (np.float32(6.0) + places[3, row])
+        wide *= np.float32(0.35)
         factor = max((np.float32(1.0) + grain[kind] * (wide + fine)) * factors[kind], np.float32(0.2))
         for color in range(3):
             luminance[row, color] *= factor

@@ -174,7 +174,7 @@ def puddles(x: Floats, y: Floats, wetness: float, table: NDArray[np.float32]) ->
     one.
     """
     mask = table.shape[0] - 1
-    noise = table[(y * 12.0).astype(np.int64) & mask, (x * 12.0).astype(np.int64) & mask]
+    noise = table[np.floor(y * 12.0).astype(np.int64) & mask, np.floor(x * 12.0).astype(np.int64) & mask]
     film = np.float32(0.25 * min(2.0 * wetness, 1.0))
     pool = np.clip((noise + np.float32(2.6 * wetness - 1.6)) * np.float32(1.5), np.float32(0.0), np.float32(1.0))
     smoothness: Floats = film + (np.float32(1.0) - film) * pool

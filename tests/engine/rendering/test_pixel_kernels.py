@@ -97,8 +97,8 @@ def test_grain_varies_luminance_by_two_tables() -> None:
     expected = luminance.copy()
     for row in np.flatnonzero(finish):
         x, y, distance = places[0, row] + place[0], places[1, row] + place[1], places[3, row]
-        wide = 0.35 * patches[int(y * 4) % 8, int(x * 4) % 8]
-        fine = grit[int(y * 24) % 8, int(x * 24) % 8] * 4.0 / (6.0 + distance)
+        wide = 0.35 * patches[math.floor(y * 4) % 8, math.floor(x * 4) % 8]
+        fine = grit[math.floor(y * 24) % 8, math.floor(x * 24) % 8] * 4.0 / (6.0 + distance)
         expected[row] *= max((1.0 + 0.5 * (wide + fine)) * 0.7, 0.2)
     _add_grain(luminance, places, finish, grain, wet, place, patches, grit)
     np.testing.assert_allclose(luminance, expected, rtol=1e-6)

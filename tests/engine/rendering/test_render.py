@@ -13,6 +13,7 @@ from eidrive_scenario.rendering.daylight import SIZE, daylight, dome, horizon
 from eidrive_scenario.rendering.lamps import ABOVE_CUT_OFF, LOW_BEAM, intensity
 from eidrive_scenario.rendering.rasterization import rasterize
 from eidrive_scenario.rendering.shading import sampled
+from eidrive_scenario.rendering.surfaces import hollows, puddles
 from eidrive_scenario.rendering.tone_mapping import LUMA
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import Placement
@@ -250,6 +251,27 @@ def test_ground_without_roads_surrounds_distant_cameras(world: World) -> None:
     near, distant = (world.radiance(looking(0.4, x=x, y=y), PINHOLE).depth for x, y in ((0.0, 0.0), (3e4, -8192.0)))
     assert np.isfinite(near[60:]).all()
     np.testing.assert_array_equal(distant, near)
+
+
+def test_texture_of_the_ground_does_not_follow_the_camera(world: World) -> None:
+    """Cameras 20 m above the ground and 1 m apart, with pixels of 0.05 m, see the same 2 x 1 m on both sides of x = 0.
+
+    The ground is 0.06 m below the origin.
+    """
+    pinhole = Pinhole(40, 40, 400.0, 20.0, 20.0)
+    right, left = (
+        world.radiance(looking(math.pi / 2, 19.94, x=x, y=0.01, pitch=math.pi / 2), pinhole).luminance
+        for x in (0.51, -0.49)
+    )
+    assert right[:, :20].std() > 0.02 * right.mean()
+    np.testing.assert_allclose(left[:, 20:], right[:, :20], rtol=2e-3)
+
+
+def test_puddles_have_the_period_of_their_table_around_the_origin() -> None:
+    """The table has 12 values per meter and 512 in all: 128 m are three periods."""
+    x, y = (np.arange(2, dtype=np.float32)[:, None] * 128.0 + np.arange(-64, 64) / 12.0 + 0.04 for _ in range(2))
+    smoothness = puddles(x.astype(np.float32), y.astype(np.float32), 0.5, hollows())
+    np.testing.assert_array_equal(smoothness[0], smoothness[1])
 
 
 def test_sky_is_sampled_in_directions_of_ten_million_pixels() -> None:
