@@ -63,18 +63,15 @@ class LanesBeside(NamedTuple):
 
     def mirrored(self) -> LanesBeside:
         """Return the lanes with left and right exchanged."""
-        return LanesBeside(
-            -self.own,
-            -self.right,
-            -self.left,
-            -self.oncoming,
-            -self.right_edge,
-            -self.left_edge,
-            -self.far_edge,
-            -self.overtaking,
-            self.limit,
-            self.oncoming_limit,
-            self.has_solid_line,
+        return self._replace(
+            own=-self.own,
+            left=-self.right,
+            right=-self.left,
+            oncoming=-self.oncoming,
+            left_edge=-self.right_edge,
+            right_edge=-self.left_edge,
+            far_edge=-self.far_edge,
+            overtaking=-self.overtaking,
         )
 
 
@@ -258,7 +255,7 @@ class ReferenceLine:
 
     def _lanes_at(self, index: int) -> LanesBeside:
         there = self._section_at(index)
-        if there is None or self._roads is None:
+        if there is None:
             return LanesBeside()
         location, section, lanes, own, keeps_left = there
         if keeps_left:
