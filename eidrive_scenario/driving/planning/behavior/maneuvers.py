@@ -386,8 +386,7 @@ def _in_return(situation: Situation, scene: Surroundings, profile: LateralProfil
         and not hypothesis.crosses
         and not _is_in_way(situation, hypothesis)
         and _is_passable(situation, hypothesis)
-        and abs(profile.offset_at(hypothesis.s) - hypothesis.d) - hypothesis.half_width
-        < situation.body.half_width + hypothesis.margin
+        and _is_in_way(situation, hypothesis, profile.offset_at(hypothesis.s))
     ]
     return min(beside, key=attrgetter("s"), default=None)
 
