@@ -25,20 +25,14 @@ from eidrive_scenario.perception.pipeline import Perception
 from eidrive_scenario.perception.result_checks import checked_range
 from eidrive_scenario.perception.tracking.method import NO_TRACKER, TrackerSettings, TrackingMethod
 from eidrive_scenario.roads import RoadNetwork
-from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.sensor import view_sectors
 from eidrive_scenario.sensing.settings import ImuSettings, SensorSettings
 from eidrive_scenario.v2x.messages.asn1 import Asn1Encoder
 from eidrive_scenario.world.actor import ActorSpec
 
 
-def build_rig(settings: AgentSettings, spec: ActorSpec, *, seed: int = 0) -> Rig:
-    """Return the sensors of a station. Raise SettingError if the settings omit a sensor that the detector needs."""
-    return Rig(spec, station_sensors(settings), seed=seed)
-
-
 def station_sensors(settings: AgentSettings) -> dict[str, SensorSettings]:
-    """Return the sensors of a station by name. Raise SettingError as `build_rig`."""
+    """Return the sensors of a station by name. Raise SettingError if one that the detector needs is omitted."""
     kind: type[Detector] = registry("detectors").load(settings.detector, Detector)
     _check_needs(settings.detector, kind)
     return settings.rig_sensors(kind.needs, kind.default_sensors)

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from eidrive_scenario.base.requests import Overrides
 from eidrive_scenario.driving.agent import FIRST_NUMBERS, Agent, NextNumbers
-from eidrive_scenario.driving.agent_factory import build_agent, build_detector, build_rig
+from eidrive_scenario.driving.agent_factory import build_agent, build_detector, station_sensors
 from eidrive_scenario.driving.communication.radio_line_of_sight import radio_environment
 from eidrive_scenario.driving.communication.run_channel import RunChannel
 from eidrive_scenario.driving.control.vehicle_controller import ControlOverrides
@@ -242,7 +242,8 @@ class Stations(DrivingStack):
             settings, encoder = self._traffic.settings, self._traffic_encoder(spec.category, self._traffic)
         self._receivers.clear()
         context, station = self._context, ErrorSubject(f"station {spec.name!r}")
-        self._rigs[spec.name] = station.call(build_rig, settings, spec, seed=context.seed)
+        sensors = station.call(station_sensors, settings)
+        self._rigs[spec.name] = station.call(Rig, spec, sensors, seed=context.seed)
         detector = self._detectors.pop(spec.name, None) or station.call(build_detector, settings)
         if context.load_weights:
             station.call(detector.load_weights, allow_torchscript=context.allow_torchscript)

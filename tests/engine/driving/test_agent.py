@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from eidrive_scenario.driving.agent import Agent
-from eidrive_scenario.driving.agent_factory import build_agent, build_rig
+from eidrive_scenario.driving.agent_factory import build_agent, station_sensors
 from eidrive_scenario.driving.planning.conflict_area import ConflictAreaSettings
 from eidrive_scenario.driving.settings import AgentSettings
 from eidrive_scenario.driving.step import AgentStep
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.sensing.readings import EgoState, Readings, TruthReading
+from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.v2x.channel import Channel
 from eidrive_scenario.v2x.messages.message import ReceivedMessage
 from eidrive_scenario.v2x.profile import build_channel, load_profile
@@ -321,9 +322,9 @@ def test_received_object_in_conflict_area_brakes_with_conflict_deceleration(car:
 
 
 def test_rig_contains_sensors_that_the_detector_needs(car: ActorSpec) -> None:
-    assert build_rig(AgentSettings(), car).due(0.0).keys() == {"truth"}
+    assert Rig(car, station_sensors(AgentSettings())).due(0.0).keys() == {"truth"}
     with pytest.raises(SettingError, match="needs a sensor of kind truth"):
-        build_rig(AgentSettings.model_validate({"sensors": "camera"}), car)
+        station_sensors(AgentSettings.model_validate({"sensors": "camera"}))
 
 
 def test_message_contains_state_of_sender(car: ActorSpec) -> None:
