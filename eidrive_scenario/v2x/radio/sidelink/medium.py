@@ -90,7 +90,7 @@ class Sidelink(MediumAccess):
         """T2 in slots."""
         self._span = min(self._interval, round(settings.sensing_window / settings.slot))
         """Slots for which a reservation or an own transmission excludes resources."""
-        self._history = SensingHistory(0, settings.subchannels, self._span)
+        self._history = SensingHistory(settings.subchannels, self._span)
         self._grants: list[Grant | None] = []
         self._sent: list[deque[range]] = []
         """Slots of the recent transmissions of each station."""

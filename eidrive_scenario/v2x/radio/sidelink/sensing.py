@@ -92,14 +92,11 @@ class Reservations:
     rsrp       (R, N) PSSCH-RSRP [dBm]; -inf if not decoded
     """
 
-    stations: int
     span: int
     resources: Integers = field(default_factory=lambda: np.zeros((CAPACITY, 5), dtype=np.int64))
+    rsrp: NDArray[np.float32] = field(default_factory=lambda: np.zeros((CAPACITY, 0), dtype=np.float32))
     begin: int = 0
     end: int = 0
-
-    def __post_init__(self) -> None:
-        self.rsrp = np.full((CAPACITY, self.stations), NOT_DECODED, dtype=np.float32)
 
     def add(self, resources: Integers, rsrp: Array) -> None:
         """Append entries, in the order of their slots."""
@@ -121,7 +118,6 @@ class Reservations:
     def rearrange(self, rows: Sequence[int | None]) -> None:
         """Keep the columns of these former rows; None: a new station."""
         reorder_fields(self, rows, rsrp=NOT_DECODED)
-        self.stations = len(rows)
 
     def _forget(self, now: int) -> None:
         self.begin += int(np.searchsorted(self.resources[self.begin : self.end, 0], now - self.span))
@@ -133,23 +129,23 @@ class Reservations:
         while kept + count > size // 2:
             size *= 2
         resources = np.zeros((size, 5), dtype=np.int64)
-        rsrp = np.full((size, self.stations), NOT_DECODED, dtype=np.float32)
+        rsrp = np.full((size, self.rsrp.shape[1]), NOT_DECODED, dtype=np.float32)
         resources[:kept], rsrp[:kept] = self.resources[live], self.rsrp[live]
         self.resources, self.rsrp, self.begin, self.end = resources, rsrp, 0, kept
 
 
 class SensingHistory:
-    """Sensing windows of N stations (3GPP TS 36.213, 14.1.1.6, step 2, and TS 38.214, 8.1.4, step 2).
+    """Sensing windows of N stations, which `rearrange` adds (3GPP TS 36.213, 14.1.1.6, and TS 38.214, 8.1.4, step 2).
 
     span       time for which reservations count [slots]
     rssi       (WINDOW, S, N) S-RSSI by slot mod WINDOW [mW]; 0 while a station transmits
     monitored  (WINDOW, N) whether a station received in the slot
     """
 
-    def __init__(self, stations: int, subchannels: int, span: int) -> None:
-        self.rssi = np.zeros((WINDOW, subchannels, stations), dtype=np.float32)
-        self.monitored = np.zeros((WINDOW, stations), dtype=np.bool_)
-        self.reservations = Reservations(stations, span)
+    def __init__(self, subchannels: int, span: int) -> None:
+        self.rssi = np.zeros((WINDOW, subchannels, 0), dtype=np.float32)
+        self.monitored = np.zeros((WINDOW, 0), dtype=np.bool_)
+        self.reservations = Reservations(span)
         self._until: int | None = None
 
     def proceed(self, until: int) -> None:
