@@ -34,7 +34,6 @@ class ReceptionBlock(OutcomeBlock):
         self.ended = ended
         self.receptions = receptions
         self.budget = budget
-        self.receivers = receivers
         self.indices = np.repeat(np.arange(len(ended)), [len(rows) for rows in receivers])
         self.reached_receivers = np.concatenate(receivers)
         self.senders = receptions.senders[self.indices]
