@@ -66,8 +66,6 @@ class RadioEnvironment:
     @cached_property
     def heights(self) -> Array:
         """Heights of the antennas above the ground (N,) in the order of `names` [m]."""
-        if not self.grounds:
-            return self.positions[:, 2]
         return np.array([self.places[name][2] - self.grounds.get(name, 0.0) for name in self.names], dtype=float)
 
 
