@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eidrive_scenario.base.coverage import ViewSector
 from eidrive_scenario.base.detections import Detections
@@ -87,7 +86,8 @@ class Asn1Encoder:
 
     def _try(self, kind: str) -> None:
         """Encode messages of this kind with and without the optional components."""
-        car = Detections(0.0, np.array([[0, 0, 0, 4, 2, 1, 0]], float), np.ones(1), (self._station,), *unknown(1))
+        unknown = np.full((1, 2), np.nan), np.full((1, 2, 2), np.nan)
+        car = Detections(0.0, np.array([[0, 0, 0, 4, 2, 1, 0]], float), np.ones(1), (self._station,), *unknown)
         state = StationState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         for seen, more in ((car, True), (car if kind == "cam" else Detections(0.0), False)):
             sensors = (ViewSector(0.0, 0.0, 0.0, 0.0, math.pi, math.inf),) if more else None
@@ -112,11 +112,6 @@ class Asn1Encoder:
     def decode(self, kind: str, data: bytes) -> Any:
         """Return the content of an encoded message in the representation of asn1tools."""
         return self._modules.decode(TYPES[kind], data)
-
-
-def unknown(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return unknown velocities (N, 2) and covariances (N, 2, 2)."""
-    return np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan)
 
 
 def cam_value(message: Message, low_frequency: bool) -> dict[str, Any]:
