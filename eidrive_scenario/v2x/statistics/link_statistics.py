@@ -6,7 +6,6 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from functools import partial
 from numbers import Real
 from typing import Any
 
@@ -133,17 +132,15 @@ class Links:
 
     def __init__(self) -> None:
         self._queues: defaultdict[str, list[Entry]] = defaultdict(list)
-        self._counters: defaultdict[str, defaultdict[str, LinkCounters]] = defaultdict(
-            partial(defaultdict, LinkCounters)
-        )
-        """By receiver and sender."""
+        self._counters: defaultdict[tuple[str, str], LinkCounters] = defaultdict(LinkCounters)
+        """By sender and receiver."""
         self._reception_log = ReceptionLog()
         self._now = -math.inf
         """Time of the last delivery [s]."""
 
     def counters(self, sender: str, receiver: str) -> LinkCounters:
         """Return the counters of a link; create them if the link is new."""
-        return self._counters[receiver][sender]
+        return self._counters[sender, receiver]
 
     def send(
         self, message: Message, receiver: str, now: float, outcome: float | str, distance: float | None = None
@@ -228,11 +225,9 @@ class Links:
         `channel_busy_ratio` returns the channel busy ratio that a station measures.
         """
         receptions = self._reception_log.statistics_by_link(now)
-        links = sorted((sender, receiver) for receiver, senders in self._counters.items() for sender in senders)
-        busy = {receiver: channel_busy_ratio(receiver) for receiver in self._counters}
+        receivers = dict.fromkeys(receiver for _, receiver in self._counters)
+        busy = {receiver: channel_busy_ratio(receiver) for receiver in receivers}
         return {
-            (sender, receiver): self._counters[receiver][sender].statistics(
-                receptions.get((sender, receiver), ReceptionStatistics()), busy[receiver]
-            )
-            for sender, receiver in links
+            link: self._counters[link].statistics(receptions.get(link, ReceptionStatistics()), busy[link[1]])
+            for link in sorted(self._counters)
         }
