@@ -5,12 +5,10 @@ Runs of one seed that differ by messages have equal images until the vehicles dr
 
 from __future__ import annotations
 
-import hashlib
 from collections import OrderedDict
 from collections.abc import Hashable, Mapping
 from typing import Any, Generic, NamedTuple, TypeVar
 
-import numpy as np
 from numpy.typing import NDArray
 
 from eidrive_scenario.base.detections import Detections
@@ -89,8 +87,3 @@ def activate(memory: ImageMemory | None) -> None:
     """
     global _active
     _active = memory
-
-
-def key_of(network: str, image: NDArray[np.uint8]) -> Key:
-    """Return the key of an image; `network` identifies weights and settings."""
-    return network, image.shape, hashlib.sha256(np.ascontiguousarray(image).data).digest()

@@ -159,10 +159,9 @@ class OwnNetwork(ImageNetwork):
         return [detections for detections in results if detections is not None]
 
     def _key_of(self, reading: CameraReading) -> image_memory.Key:
-        digest = reading.image_digest
-        if digest is None:
-            return image_memory.key_of(self.identity, reading.rgb)
-        return self.identity, reading.size, digest
+        if reading.image_digest is not None:
+            return self.identity, reading.size, reading.image_digest
+        return self.identity, reading.rgb.shape, hashlib.sha256(np.ascontiguousarray(reading.rgb).data).digest()
 
     def candidates(self, image: NDArray[np.uint8]) -> Candidates:
         return self._candidates(self._infer([image])[0])
