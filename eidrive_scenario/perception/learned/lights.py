@@ -8,7 +8,6 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +15,7 @@ from eidrive_scenario.base.arrays import Array, Bools, Floats
 from eidrive_scenario.base.tolerances import TIME_TOLERANCE
 from eidrive_scenario.perception.detector import ImageDetections
 from eidrive_scenario.perception.geometry.projection import pixels
-from eidrive_scenario.perception.learned.image_network import STOP_SIGN, UNKNOWN, light_state
+from eidrive_scenario.perception.learned.image_network import STOP_SIGN, UNKNOWN, light_state, resized
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.roads.model.signal_states import (
     FLASHES_PER_SECOND,
@@ -53,9 +52,7 @@ def crops(image: NDArray[np.uint8], centers: Array, heights: Array) -> Floats:
     for row, ((x, y), height) in enumerate(zip(centers.tolist(), heights.tolist(), strict=True)):
         high = max(REGION_HEIGHT * height, 4.0)
         region = _region(image, x - high / 4.0, y - high / 2.0, x + high / 4.0, y + high / 2.0)
-        shrinks = region.shape[0] >= CROP[1] and region.shape[1] >= CROP[0]
-        scaled = cv2.resize(region, CROP, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
-        regions[row] = scaled.transpose(2, 0, 1) / np.float32(255.0)
+        regions[row] = resized(region, CROP).transpose(2, 0, 1) / np.float32(255.0)
     brightest = regions.max(axis=(1, 2, 3), keepdims=True, initial=DARKEST)
     return np.asarray(regions / brightest, dtype=np.float32)
 
