@@ -139,7 +139,7 @@ class ImageDetector(Detector):
         }
         signals = self._lights.read(images, readings.cameras)
         parts = [self._lift_image(detections, readings, camera) for camera, detections in images.items()]
-        return StationDetections(images, signals, merge_duplicates(parts, readings.time))
+        return StationDetections(images, signals, without_duplicates(Detections.concatenate(readings.time, parts)))
 
     def _key_of(self, network: ImageNetwork, readings: Readings) -> Key | None:
         """Return everything that determines the result of these readings; None if a part of it is unknown."""
@@ -264,8 +264,3 @@ def most_certain(estimates: Sequence[Detections]) -> Detections:
         scores=np.stack([estimate.scores for estimate in estimates])[best, rows],
         covariance=np.stack([estimate.covariance for estimate in estimates])[best, rows],
     )
-
-
-def merge_duplicates(parts: list[Detections], time: float) -> Detections:
-    """Return all detections except those that overlap one with a higher score."""
-    return without_duplicates(Detections.concatenate(time, parts))

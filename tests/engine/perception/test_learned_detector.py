@@ -15,8 +15,8 @@ from eidrive_scenario.base.detections import CLASSES, Detections
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.extensions.registry import registry
 from eidrive_scenario.extensions.settings import parse_settings
-from eidrive_scenario.perception.detector import DetectorContext, ImageDetections
-from eidrive_scenario.perception.learned.detector import LearnedDetector, SsdDetector, YoloDetector, merge_duplicates
+from eidrive_scenario.perception.detector import DetectorContext, ImageDetections, without_duplicates
+from eidrive_scenario.perception.learned.detector import LearnedDetector, SsdDetector, YoloDetector
 from eidrive_scenario.perception.learned.image_network import IMAGE_CLASSES, misspelt, object_category
 from eidrive_scenario.perception.learned.network_loading import SHIPPED, build_network
 from eidrive_scenario.perception.learned.settings import LearnedSettings
@@ -170,7 +170,7 @@ def test_registry_loads_learned_detectors_by_entry_point() -> None:
     assert [type(sensor) for sensor in YoloDetector.default_sensors.values()] == [CameraSettings, LidarSettings]
 
 
-def test_merge_duplicates_keeps_box_with_highest_score() -> None:
+def test_without_duplicates_keeps_box_with_highest_score() -> None:
     def part(boxes: list[list[float]], scores: list[float], name: str) -> Detections:
         count = len(boxes)
         nowhere = np.full((count, 2), np.nan)
@@ -178,10 +178,11 @@ def test_merge_duplicates_keeps_box_with_highest_score() -> None:
 
     first_box, second_box = [10.0, 0.0, 0.75, 4.5, 1.8, 1.5, 0.0], [20.0, 0.0, 0.75, 4.5, 1.8, 1.5, 0.0]
     beside = [11.0, 0.2, 0.75, 4.5, 1.8, 1.5, 0.1]
-    found = merge_duplicates([part([first_box, second_box], [0.6, 0.9], "car"), part([beside], [0.8], "truck")], 1.0)
+    parts = [part([first_box, second_box], [0.6, 0.9], "car"), part([beside], [0.8], "truck")]
+    found = without_duplicates(Detections.concatenate(1.0, parts))
     assert found.scores.tolist() == [0.9, 0.8]
     assert found.classes == ("car", "truck")
-    assert len(merge_duplicates([], 2.0)) == 0
+    assert len(without_duplicates(Detections.concatenate(2.0, []))) == 0
 
 
 def test_detect_with_onnx_weights_returns_configured_classes(readings: Readings) -> None:
