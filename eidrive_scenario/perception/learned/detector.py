@@ -26,7 +26,6 @@ from eidrive_scenario.perception.learned.lights import LightsOnMap, LightStates,
 from eidrive_scenario.perception.learned.network_loading import build_network, check_network, runtime_of, weights_path
 from eidrive_scenario.perception.learned.runtimes import runtime_versions
 from eidrive_scenario.perception.learned.settings import LearnedSettings
-from eidrive_scenario.perception.learned.weights import check_weights_exist
 from eidrive_scenario.perception.lifting.lifting import lift
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.camera import unexposed
@@ -223,9 +222,8 @@ class LearnedDetector(ImageDetector):
         super().__init__()
         self.settings = settings or LearnedSettings()
         self.input_size, self.letterbox = self.settings.input_size or INPUT_SIZE, self.settings.letterbox
-        path = weights_path(self.network, self.settings)
-        check_weights_exist(path)
-        self.library_versions = runtime_versions(runtime_of(path, self.settings))
+        runtime = runtime_of(weights_path(self.network, self.settings), self.settings)
+        self.library_versions = runtime_versions(runtime)
         self.processes_batches = self.settings.device == "cuda"
 
     def check_weights(self, *, allow_torchscript: bool = False) -> None:

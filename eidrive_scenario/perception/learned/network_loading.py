@@ -24,8 +24,10 @@ SHIPPED = Path(__file__).parents[1] / "weights"
 
 
 def weights_path(name: str, settings: LearnedSettings) -> Path:
-    """Return the path of the weights that the settings of this detector select."""
-    return SHIPPED / f"{name}{OWN_SUFFIX}" if settings.weights is None else Path(settings.weights)
+    """Return the path of the weights that the settings of this detector select. Raise SettingError if it is no file."""
+    path = SHIPPED / f"{name}{OWN_SUFFIX}" if settings.weights is None else Path(settings.weights)
+    check_weights_exist(path)
+    return path
 
 
 def runtime_of(path: Path, settings: LearnedSettings) -> Runtime:
@@ -40,7 +42,6 @@ def check_network(name: str, settings: LearnedSettings, *, allow_torchscript: bo
     the user, and if the runtime is not installed. Nothing is read or imported.
     """
     path = weights_path(name, settings)
-    check_weights_exist(path)
     if path.suffix == TORCHSCRIPT_SUFFIX and not torchscript_is_allowed(allow_torchscript):
         raise refused_torchscript(path)
     runtime = runtime_of(path, settings)
