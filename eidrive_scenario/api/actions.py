@@ -49,12 +49,14 @@ from eidrive_scenario.storyboard.kinematics.trajectory_sampling import sample_tr
 from eidrive_scenario.storyboard.kinematics.transition_profile import TransitionProfile as TransitionProfile
 from eidrive_scenario.storyboard.positions.distances import TIME_DELTA as TIME_DELTA
 from eidrive_scenario.storyboard.positions.distances import MovedContext as MovedContext
+from eidrive_scenario.storyboard.positions.distances import axis_headings as axis_headings
 from eidrive_scenario.storyboard.positions.distances import closing_speed as closing_speed
 from eidrive_scenario.storyboard.positions.distances import distance as distance
 from eidrive_scenario.storyboard.positions.distances import entity_box as entity_box
 from eidrive_scenario.storyboard.positions.distances import resolve_coordinate_system as resolve_coordinate_system
 from eidrive_scenario.storyboard.positions.distances import resolve_distance_type as resolve_distance_type
 from eidrive_scenario.storyboard.positions.distances import same_way as same_way
+from eidrive_scenario.storyboard.positions.distances import speed_along_axis as speed_along_axis
 from eidrive_scenario.storyboard.positions.position_types import count_lanes as count_lanes
 from eidrive_scenario.storyboard.positions.position_types import facing as facing
 from eidrive_scenario.storyboard.positions.resolution import referenced_entities as referenced_entities

@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
+from opendrive_xml import lanes_xml, map_xml, road_xml
 from openscenario_xml import round_car_xml
 from recorded_scene import RunScene
 from storyboard_xml import element_state_xml, lane_position_xml, speed_xml, teleport_xml, world_position_xml
@@ -494,6 +495,26 @@ def test_distances_along_world_axes_are_kept_in_both_directions(
     played = scene(4, ("Ego", action), ego=(lane, 500.0, 10.0), other=(-2, 500.0, 0.0))
     assert x is None or played.at(4.0).x == pytest.approx(500.0 + x)
     assert y is None or played.at(4.0).y == pytest.approx(y)
+
+
+@pytest.mark.element("LateralDistanceAction", "LongitudinalDistanceAction")
+@pytest.mark.parametrize("degrees", [60.0, 120.0, -60.0])
+def test_distances_along_world_axes_are_kept_on_oblique_roads(scene: RunScene, degrees: float) -> None:
+    """At 60° to x, 20 m along x are 40 m of road, and 3 m along y are 6 m across it. Ego is beside and behind Other."""
+    oblique = map_xml(road_xml(length=1000.0, hdg=math.radians(degrees), lanes=lanes_xml(1, 2, 4)))
+    beside, apart = keep_beside(THREE_METERS, frame="world"), keep_apart("trailingReferencedEntity", "world")
+    cars: dict[str, Any] = {"ego": (-1, 100.0, 10.0), "other": (-2, 150.0, 10.0), "street": oblique}
+    scenes = [scene(1, ("Ego", action), **cars) for action in (beside, apart)]
+    offsets = [(played.at(1.0), played.at(1.0, "Other")) for played in scenes]
+    assert abs(offsets[0][1].y - offsets[0][0].y) == pytest.approx(3.0)
+    assert offsets[1][1].x - offsets[1][0].x == pytest.approx(math.copysign(20.0, math.cos(math.radians(degrees))))
+
+
+def test_distances_across_the_motion_have_no_effect(scene: RunScene) -> None:
+    north = map_xml(road_xml(length=1000.0, hdg=0.5 * math.pi, lanes=lanes_xml(1, 2, 4)))
+    steps = [("Ego", keep_beside(THREE_METERS, frame="world")), ("Ego", keep_apart("any", "world"))]
+    ego = scene(2, *steps, street=north).at(2.0)
+    assert (ego.x, ego.y) == pytest.approx((2.0, 140.0))
 
 
 OFF_ROAD = [(-30, -2), (100, -90)]

@@ -11,8 +11,9 @@ from itertools import pairwise
 import pytest
 from eidrive_behaviors.actions.speed import slope_limit
 from recorded_scene import RecordedScene, RunScene
-from storyboard_xml import speed_xml
+from storyboard_xml import speed_xml, teleport_xml, world_position_xml
 from street_scene import after
+from trajectories import curve, follow, world
 from whole_run import Run
 
 from eidrive_scenario.recording.frame import Frame
@@ -176,6 +177,33 @@ def test_longitudinal_distance_backwards_mirrors_forwards(scene: RunScene, lane:
     peak = speeds[1].index(min(speeds[1]))
     braking = [(after - before) / 0.1 for before, after in pairwise(speeds[1][peak:])]
     assert max(braking) == pytest.approx(6.0)
+
+
+@pytest.mark.element("LongitudinalDistanceAction", "FollowTrajectoryAction")
+@pytest.mark.parametrize("limits", [LIMITS, ""])
+@pytest.mark.parametrize("system", ["trajectory", "lane", "entity", "world"])
+def test_longitudinal_distance_of_actor_moving_tail_first_is_kept(scene: RunScene, system: str, limits: str) -> None:
+    """Ego faces +x, but moves to -x until 2 s; its trajectory ends at x = 60. Other is 80 m ahead, at 5 m/s."""
+    tail_first = follow(curve(*(world(x, -2.0, 0.0) for x in (100.0, 90.0, 60.0))))
+    action = keep("any", limits).replace("lane", system)
+    steps = ("Ego", tail_first), ("Ego", action, after(1.95))
+    played = scene(40, *steps, ego=(-1, 100.0, 10.0), other=(-1, 150.0, 5.0))
+    assert played.at(2.1).speed >= played.at(2.0).speed == -10.0
+    last = played.rows[-1]
+    assert last["Other"].x - last["Ego"].x == pytest.approx(20.0, abs=0.05)
+    assert last["Ego"].speed == pytest.approx(5.0, abs=0.02)
+
+
+@pytest.mark.element("LongitudinalDistanceAction")
+def test_longitudinal_distance_of_crossing_actor_applies_along_its_heading(scene: RunScene) -> None:
+    """Ego moves towards +y at x = 100; Other, 40 m ahead of it, drives across its heading at 5 m/s."""
+    north = '<WorldPosition x="100" y="{}" h="1.5707963267948966"/>'
+    action = keep("leadingReferencedEntity", "").replace("lane", "entity")
+    east = teleport_xml(world_position_xml(90.0, 0.0))
+    steps = ("Ego", teleport_xml(north.format(-40.0))), ("Other", east), ("Ego", action, after(0.95))
+    ego = scene(3, *steps, ego=(-1, 100.0, 10.0), other=(-1, 150.0, 5.0)).at(3.0)
+    assert (ego.x, ego.speed) == pytest.approx((100.0, 0.0), abs=1e-9)
+    assert abs(ego.y) == pytest.approx(20.0)
 
 
 @pytest.mark.element("SynchronizeAction")

@@ -8,7 +8,7 @@ from py_trees.common import Status
 
 from eidrive_behaviors.actions.following import check_other_entity, check_presence, warn_without_effect
 from eidrive_behaviors.actions.lane_change import STANDING
-from eidrive_behaviors.actions.longitudinal_distance import STIFFNESS, infinite_if_none
+from eidrive_behaviors.actions.longitudinal_distance import LEAST_SHARE, STIFFNESS, infinite_if_none
 from eidrive_scenario.api.actions import (
     STEEPEST,
     ActionBehaviour,
@@ -34,8 +34,9 @@ class LateralDistanceAction(ActionBehaviour):
     were parallel to the lane.
 
     In the entity frame the distance is also measured across the lane at the position of the actor. The axis of the
-    actor turns with the motion that the distance commands, which would cause oscillation. The standard does not specify
-    the course of the distance; the distance actions of esmini have such a spring.
+    actor turns with the motion that the distance commands, which would cause oscillation. In the world frame it is that
+    along y; an actor whose lane is at an angle to x moves so much farther, along y it has no effect. The standard does
+    not specify the course of the distance; the distance actions of esmini have such a spring.
     """
 
     domains = Domain.LATERAL
@@ -45,6 +46,7 @@ class LateralDistanceAction(ActionBehaviour):
         """Reset the rate; without a displacement select the current side."""
         check_other_entity(self, self.action.entity_ref)
         self._rate = 0.0
+        self._frame = resolve_coordinate_system(self.action.coordinate_system)
         if self.actor.motion.location is None:
             self.actor.motion.snap_to_lane()
         if self.actor.motion.location is None and not self.actor.driven:
@@ -64,6 +66,11 @@ class LateralDistanceAction(ActionBehaviour):
         error = self._side() * self._wanted_gap() + self._lateral_gap()
         if math.isnan(error):
             return Status.RUNNING
+        share = abs(math.cos(motion.course)) if self._frame == "world" else 1.0
+        if share < LEAST_SHARE:
+            self.warn(f"no effect while {self.actor.name!r} moves along the axis of the distance")
+            return Status.RUNNING
+        error /= share
         sideways = self._lateral_displacement(error, dt)
         most = STEEPEST * abs(motion.speed) * dt
         jumps = abs(sideways) > most
@@ -71,7 +78,7 @@ class LateralDistanceAction(ActionBehaviour):
             jumps, sideways = False, math.copysign(most, sideways)
             self._rate = sideways / dt
         offset = here.offset * roads.driving_direction(here.road, here.lane) + sideways * motion.direction
-        ends = abs(error - sideways) < REACHED and not self.action.continuous
+        ends = abs(error - sideways) * share < REACHED and not self.action.continuous
         heading = 0.0 if ends or jumps or abs(motion.speed) <= STANDING else None
         motion.set_lateral_step(LateralStep(offset, heading, shortens_distance=not jumps))
         return Status.SUCCESS if ends else Status.RUNNING
@@ -100,8 +107,7 @@ class LateralDistanceAction(ActionBehaviour):
         if displacement in (None, model.LateralDisplacement.ANY):
             return self._nearest_side
         left = displacement is model.LateralDisplacement.LEFT_TO_REFERENCED_ENTITY
-        frame = resolve_coordinate_system(self.action.coordinate_system)
-        way = same_way(self.context, self.actor.name, self.action.entity_ref, frame)
+        way = same_way(self.context, self.actor.name, self.action.entity_ref, self._frame)
         return way if left else -way
 
     def _lateral_gap(self) -> float:
@@ -109,8 +115,7 @@ class LateralDistanceAction(ActionBehaviour):
 
         It is that of the reference points, or of the centers of the boxes for free space.
         """
-        frame = resolve_coordinate_system(self.action.coordinate_system)
-        me, other = self.actor.name, self.action.entity_ref
+        me, other, frame = self.actor.name, self.action.entity_ref, self._frame
         here, roads = self.actor.motion.location, self.context.roads
         if frame == "entity" and here is not None and roads is not None:
             lane = roads.pose(here).h + (0.0 if self.actor.motion.direction > 0 else math.pi)
@@ -118,7 +123,7 @@ class LateralDistanceAction(ActionBehaviour):
             beside = (theirs.y - mine.y) * math.cos(lane) - (theirs.x - mine.x) * math.sin(lane)
         else:
             beside = distance(self.context, me, other, frame=frame, kind="lateral", freespace=False)
-            if frame == "world" and math.cos(self.context.pose(me).h) < 0.0:
+            if frame == "world" and math.cos(self.actor.motion.course) < 0.0:
                 beside = -beside
         if not self.action.freespace:
             return beside

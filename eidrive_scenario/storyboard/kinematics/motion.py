@@ -54,12 +54,23 @@ class Motion(MotionState):
         self._snaps_to_lane = False
         self._pose_at_distance: Callable[[float], Pose] | None = None
         self._lane_distance: float | None = None
+        self._carried = True
         self._crosses = False
         self._teleport = False
         self._leaves_curve = False
         """Whether the speed refers to the heading after the current step, and no longer to a trajectory."""
         self._stops = False
         """Whether the actor stops in the next step, unless an action moves it."""
+
+    @property
+    def course(self) -> float:
+        """Direction in which a positive speed moves the actor [rad]: that of its lane, or along or against its heading.
+
+        On a trajectory with other headings it is that of the trajectory instead.
+        """
+        if self._location is not None and not self._crosses:
+            return self._pose.h - self._heading + (0.0 if self.direction > 0 else math.pi)
+        return self._pose.h + math.pi if self._backs else self._pose.h
 
     def set_speed(self, speed: float, sense: int | None = None) -> None:
         """Set the speed [m/s] from the current step on.
@@ -126,9 +137,12 @@ class Motion(MotionState):
         self._snaps_to_lane = land
         self._teleported = self._teleported or jump
 
-    def move_along_lane(self, distance: float) -> None:
-        """Set the distance of the current step along lane or trajectory [m], independent of speed and heading."""
-        self._lane_distance, self._rests = distance, False
+    def move_along_lane(self, distance: float, *, carried: bool = True) -> None:
+        """Set the distance of the current step along lane or trajectory [m], independent of the speed.
+
+        carried  whether an actor that crosses the road moves along the lane as well, and not along its heading
+        """
+        self._lane_distance, self._carried, self._rests = distance, carried, False
 
     def set_reference_lane(self, lane: int) -> LaneLocation | None:
         """Refer the location to another lane of the same road. Return it with the offset from that lane."""
@@ -205,7 +219,7 @@ class Motion(MotionState):
         elif distance == 0.0 and steering is None:
             stands = self._speed == 0.0 and math.copysign(1.0, self._speed) == 1.0
             self._rests = stands and not self._end_of_road and not self._teleported
-        elif self._location is not None and (lane_distance is not None or not self._crosses):
+        elif self._location is not None and (not self._crosses or (lane_distance is not None and self._carried)):
             self._move_along_lane(distance, steering, dt)
         else:
             self._move_freely(distance)

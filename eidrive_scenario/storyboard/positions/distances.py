@@ -9,6 +9,7 @@ from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.openscenario import model
 from eidrive_scenario.roads import Chain, LaneLocation, Pose, RoadNetwork
 from eidrive_scenario.storyboard.context.contexts import ConditionContext, EntityAbsentError
+from eidrive_scenario.storyboard.kinematics.motion import ACROSS
 from eidrive_scenario.storyboard.kinematics.motion_state import ResolvedPosition
 from eidrive_scenario.storyboard.kinematics.trajectory import TrajectoryProgress
 
@@ -43,7 +44,13 @@ def free_space(context: ConditionContext, a: str, b: str | None, frame: str, kin
     """
     axis = _own_axis(context, a, frame)
     mine = _extent(context, a, axis, frame, kind)
-    theirs = (0.0, 0.0) if b is None else _extent(context, b, _axis_at(context, a, b, frame, axis), frame, kind)
+    theirs = (0.0, 0.0)
+    if b is not None:
+        there, heading = _axis_at(context, a, b, frame, axis), context.pose(b).h
+        if frame == "trajectory" and context.actors[a].progress is not None:
+            # Beside a trajectory a box counts with its own length and width.
+            there = heading if math.cos(heading - there) >= 0.0 else heading + math.pi
+        theirs = _extent(context, b, there, frame, kind)
     if value + theirs[0] > mine[1]:
         return value + theirs[0] - mine[1]
     if value + theirs[1] < mine[0]:
@@ -85,8 +92,7 @@ def _axis_at(context: ConditionContext, a: str, b: str, frame: str, axis: float)
     if progress is not None:
         station, pose = progress.at(context.view.tick), context.pose(b)
         layout = progress.layout
-        turn = layout.tangent(layout.project(pose.x, pose.y, station)[0]) - layout.tangent(station)
-        return pose.h if math.cos(pose.h - turn - axis) >= 0.0 else pose.h + math.pi
+        return axis + layout.tangent(layout.project(pose.x, pose.y, station)[0]) - layout.tangent(station)
     return axis
 
 
@@ -180,8 +186,11 @@ def distance(
 def same_way(context: ConditionContext, a: str, b: str, frame: str) -> float:
     """Return +1.0 if actor `b` points in the direction of `a`, -1.0 for the opposite direction.
 
-    The frames of lane and road compare directions along the road between both, other frames their headings.
+    The frames of lane and road compare directions along the road between both, that of the world directions along x,
+    other frames the headings.
     """
+    if frame == "world":
+        return math.copysign(1.0, math.cos(context.pose(a).h) * math.cos(context.pose(b).h))
     turn = context.pose(b).h - context.pose(a).h
     if frame in ("lane", "road") and context.roads is not None:
         here, there = context.location(a), context.location(b)
@@ -190,6 +199,24 @@ def same_way(context: ConditionContext, a: str, b: str, frame: str) -> float:
             headings = [context.roads.road_pose_at(location.road, location.s).h for location in (here, there)]
             turn += headings[0] - headings[1] + (0.0 if relative_direction > 0 else math.pi)
     return 1.0 if math.cos(turn) >= 0.0 else -1.0
+
+
+def axis_headings(context: ConditionContext, a: str, b: str, frame: str) -> tuple[float, float]:
+    """Return the headings of the longitudinal axis of actor `a` at `a` and at actor `b` [rad]."""
+    axis = _own_axis(context, a, frame)
+    return axis, _axis_at(context, a, b, frame, axis)
+
+
+def speed_along_axis(context: ConditionContext, a: str, b: str, frame: str) -> float:
+    """Return the speed of actor `b` along the longitudinal axis of actor `a` [m/s].
+
+    In the entity frame the axis of an actor that drives along its road turns with the road.
+    """
+    if frame == "entity" and context.roads is not None:
+        here = context.location(a)
+        if here is not None and abs(math.cos(context.pose(a).h - context.roads.pose(here).h)) >= ACROSS:
+            frame = "road"
+    return context.speed(b) * math.cos(context.pose(b).h - axis_headings(context, a, b, frame)[1])
 
 
 class MovedContext(ConditionContext):
