@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from opendrive_xml import map_xml, road_xml
 from recorded_scene import RunScene
-from storyboard_xml import private_xml, speed_xml
+from storyboard_xml import private_xml, speed_xml, teleport_xml
 from street_scene import after
 
 from eidrive_scenario.errors import ScenarioError
@@ -34,6 +34,15 @@ def test_cruise_behind_car_around_a_bend_brakes_by_the_law(scene: RunScene) -> N
     bend = map_xml(road_xml(length=163.56, geometry=geometry))
     played = scene(1, ("Ego", ON), cruise={}, ego=(-1, 100.0, 10.0), other=(-1, 114.0, 10.0), street=bend)
     assert played.at(0.1).speed == pytest.approx(10.0 - 1.25 * 0.1)
+
+
+def test_cruise_counts_speed_of_oncoming_car_as_negative(scene: RunScene) -> None:
+    """Gap 27 m, both fronts are 4 m from the reference points; f = 0.5 and a = 2.5 · 0.5 - 0.5 · (10 + 10) m/s²."""
+    turn = teleport_xml('<WorldPosition x="135" y="-2" h="3.141592653589793"/>')
+    steps, other = (("Other", turn), ("Ego", ON, after(0.05))), (-1, 135.0, 10.0)
+    played = scene(1, *steps, cruise={}, ego=(-1, 99.0, 10.0), other=other)
+    assert played.at(0.1, "Other").x - played.at(0.1).x == pytest.approx(35.0)
+    assert played.at(0.2).speed == pytest.approx(10.0 + (2.5 * 0.5 - 0.5 * 20.0) * 0.1)
 
 
 def test_cruise_on_a_free_road_keeps_the_speed_of_speed_actions(scene: RunScene) -> None:

@@ -16,6 +16,7 @@ from eidrive_scenario.api.actions import (
     model,
     property_entries,
     same_way,
+    speed_along_axis,
 )
 from eidrive_scenario.api.common import Diagnostic, ScenarioError, suggestion
 
@@ -90,6 +91,8 @@ ACCELERATION_SHARE = 0.7
 """Share of the vehicle's maximum acceleration that is used on a free road."""
 GAIN = 2.5
 """Acceleration at a large gap [m/s²]."""
+ALONG = 0.5
+"""Minimum share of the speed of another vehicle along the own lane, 60°: beyond this angle it crosses the lane."""
 SPEED_CHANGE = 1e-3
 """Speed difference above which another action has set the speed [m/s]."""
 
@@ -98,10 +101,11 @@ class AdaptiveCruise(ControllerModel):
     """Control of the set speed on a free road, and of 3 m plus a time gap behind the lead vehicle.
 
     The law is that of esmini's ACC and ALKS controllers, so that scenarios for them can be run. With the gap g, the
-    wanted gap w = 3 m + `timeGap` · max(v, v_lead) and f = min(1, g / w - 1) the acceleration is 2.5 f - f (v - v_set)
-    - (1 - f) (v - min(v_set, v_lead)), within the vehicle's Performance and up to the set speed. The set speed is the
-    speed at activation, or that of SpeedActions. With the property `mode=override` it is `setSpeed` [m/s], and
-    SpeedActions have no effect. Further properties: `timeGap` [s, 1.5], `lateralDist` [m, 5].
+    speed v_lead of the lead, negative if it is oncoming, the wanted gap w = 3 m + `timeGap` · max(v, v_lead) and
+    f = min(1, g / w - 1) the acceleration is 2.5 f - f (v - v_set) - (1 - f) (v - min(v_set, v_lead)), within the
+    vehicle's Performance and up to the set speed. The set speed is the speed at activation, or that of SpeedActions.
+    With the property `mode=override` it is `setSpeed` [m/s], and SpeedActions have no effect. Further properties:
+    `timeGap` [s, 1.5], `lateralDist` [m, 5].
     """
 
     def __init__(self, controller: model.Controller, context: ControllerContext, actor: Actor) -> None:
@@ -148,11 +152,17 @@ class AdaptiveCruise(ControllerModel):
     def _find_lead(self) -> tuple[float, float] | None:
         """Return gap [m] and speed [m/s] of the nearest vehicle in the path; None if there is none."""
         leads = [
-            (gap, self.context.speed(name))
+            (gap, self._speed_of(name))
             for name, other in self.context.actors.items()
             if other is not self.actor and other.present and (gap := self._gap(name)) is not None
         ]
         return min(leads, default=None)
+
+    def _speed_of(self, name: str) -> float:
+        """Return the speed of a vehicle [m/s], negative for an oncoming one; of a crossing one, as in esmini."""
+        speed = self.context.speed(name)
+        along = speed_along_axis(self.context, self.actor.name, name, "entity")
+        return math.copysign(speed, along) if abs(along) > ALONG * abs(speed) else speed
 
     def _gap(self, name: str) -> float | None:
         context, me = self.context, self.actor.name
@@ -188,7 +198,7 @@ class AdaptiveCruise(ControllerModel):
             distance(self.context, me, name, frame="entity", kind=kind, freespace=True)
             for kind in ("longitudinal", "lateral")
         )
-        faster_by = max(0.0, self._last - self.context.speed(name))
+        faster_by = max(0.0, self._last - self._speed_of(name))
         length = entity_box(self.context, name)[3]
         return along if 0.0 < along < 1.0 + length + 0.5 * faster_by and -0.5 < lateral < 0.2 else None
 
