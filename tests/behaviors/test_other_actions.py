@@ -181,6 +181,26 @@ def test_variable_beyond_all_numbers_remains_a_number(scene: RunScene) -> None:
     assert "variable Mood = -INF" in played.why("event 2")
 
 
+@pytest.mark.parametrize(
+    ("start", "rule", "expected"),
+    [
+        ("4503599627370496", '<AddValue value="1"/>', "4503599627370497"),
+        ("0.1", '<AddValue value="0.2"/>', "0.3"),
+        ("INF", '<MultiplyByValue value="0"/>', "NaN"),
+    ],
+)
+def test_modified_variable_is_exact_in_xml_notation(scene: RunScene, start: str, rule: str, expected: str) -> None:
+    """2**52 + 1 is a double, 0.1 + 0.2 is 0.3 to 15 digits, and infinity times 0 is not a number."""
+    change = '<VariableAction variableRef="Mood">{}</VariableAction>'
+    modify = f"<ModifyAction><Rule>{rule}</Rule></ModifyAction>"
+    seen = f'<VariableCondition variableRef="Mood" rule="equalTo" value="{expected}"/>'
+    by_value = f"<ByValueCondition>{seen}</ByValueCondition>"
+    steps = [("Ego", global_xml(change.format(f'<SetAction value="{start}"/>')), after(0.15))]
+    played = scene(1, *steps, ("Ego", global_xml(change.format(modify)), after(0.35)), ("Ego", NOTHING, by_value))
+    assert played.when("event 2", "runningState") == pytest.approx(0.4)
+    assert played.why("event 2") == f"variable Mood = {expected} = {expected}"
+
+
 def test_variable_modify_of_text_is_rejected(scene: RunScene) -> None:
     rule = '<Rule><AddValue value="3"/></Rule>'
     add = f'<VariableAction variableRef="Mood"><ModifyAction>{rule}</ModifyAction></VariableAction>'

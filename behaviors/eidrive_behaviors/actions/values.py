@@ -72,7 +72,9 @@ class ModifyAction(ValueAction):
             value += rule.add_value.value
         elif rule.multiply_by_value is not None:
             value *= rule.multiply_by_value.value
-        self.set_value(f"{value:.15g}".replace("inf", "INF"))
+        # 15 digits are free of rounding errors, as in 0.1 + 0.2, but too few for large integers
+        digits = 15 if abs(value) < 1e15 else 17
+        self.set_value(f"{value:.{digits}g}".replace("inf", "INF").replace("nan", "NaN"))
         return Status.SUCCESS
 
     def describe(self) -> str:
