@@ -21,8 +21,8 @@ QUICK = ("--detectors", "oracle", "--workers", "1")
 
 def files(folder: Path) -> dict[str, bytes]:
     """Return report, tables and figures, without the record and the files that contain durations."""
-    found = (path for path in folder.iterdir() if path.suffix in (".md", ".csv", ".json", ".png"))
-    return {path.name: path.read_bytes() for path in found if path.name != "provenance.json"}
+    written = (path for path in folder.iterdir() if path.suffix in (".md", ".csv", ".json", ".png"))
+    return {path.name: path.read_bytes() for path in written if path.name != "provenance.json"}
 
 
 @pytest.mark.process

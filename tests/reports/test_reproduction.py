@@ -5,10 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import os
+import subprocess
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from eidrive_reports.reproduction import provenance
 from eidrive_reports.reproduction.episodes import ObjectCounter
 from eidrive_reports.reproduction.layout import Column, DataTable, Row, as_csv, plain
 from eidrive_reports.reproduction.part import Part
@@ -96,6 +98,29 @@ def test_digest_changes_with_the_road_file_of_a_scenario_of_a_user(tmp_path: Pat
         (folder / "own.xosc").write_bytes(scenario_xml(road=road_file_xml("road.xodr")))
         digests.add(job_digest(str(folder / "own.xosc"), RunSettings()))
     assert len(digests) == 2
+
+
+def test_tables_in_the_checkout_do_not_change_its_commit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first call precedes the tables. `+` marks a file that differs before the runs."""
+
+    def git(*arguments: str) -> str:
+        user = ("-c", "user.name=a", "-c", "user.email=a@example.org")
+        return subprocess.check_output(["git", *user, *arguments], cwd=tmp_path, text=True).strip()
+
+    table = tmp_path / "xosc" / "table.csv"
+    table.parent.mkdir()
+    table.write_text("1")
+    git("init", "--quiet")
+    git("add", ".")
+    git("commit", "--quiet", "--message", "first")
+    monkeypatch.setattr(provenance, "library_path", lambda: table.parent)
+    provenance.commit.cache_clear()
+    before = provenance.commit()
+    table.write_text("12")
+    assert provenance.commit() == before == git("rev-parse", "HEAD")
+    provenance.commit.cache_clear()
+    assert provenance.commit() == f"{before}+"
+    provenance.commit.cache_clear()
 
 
 def test_counter_counts_objects_after_fusion_while_the_station_is_present() -> None:

@@ -151,18 +151,26 @@ def read_provenance(out: Path) -> dict[str, Any]:
 
 
 def write_provenance(
-    out: Path, part: str, values: Mapping[str, Any], *, added: int, elapsed_s: float, processes: int
+    out: Path,
+    part: str,
+    values: Mapping[str, Any],
+    *,
+    checkout: str | None,
+    added: int,
+    elapsed_s: float,
+    processes: int,
 ) -> None:
     """Add the origin of a part to the file of a folder, which keeps those of other parts.
 
     values     further values of the part, such as seeds
+    checkout   `commit` before the call
     added      number of runs of this call; without one, commit and duration remain those of the call that computed
     elapsed_s  duration of this call [s];  processes  number of its processes
     """
     origins = read_provenance(out)
     code = {"version": version(ENGINE), "code": code_digest(), "python": platform.python_version()}
     call = {
-        "commit": commit(),
+        "commit": checkout,
         "runs_of_last_call": added,
         "last_call_s": round(elapsed_s, 1),
         "processes": processes,
@@ -175,8 +183,12 @@ def write_provenance(
         stream.write((json.dumps(parts, indent=1, sort_keys=True) + "\n").encode())
 
 
+@cache
 def commit() -> str | None:
-    """Return the commit of the checkout, followed by `+` if files differ from it; None outside of a checkout."""
+    """Return the commit of the checkout, followed by `+` if files differ from it; None outside of a checkout.
+
+    The result is that of the first call: reports that parts write may be files of the checkout.
+    """
     folder = library_path()
     try:
         if Path(_git(folder, "rev-parse", "--show-toplevel")) != folder.resolve().parent:

@@ -14,7 +14,7 @@ from rich.console import Console
 from eidrive_reports.reproduction.episodes import Episode, run_episode
 from eidrive_reports.reproduction.layout import PartReport, Section, as_csv
 from eidrive_reports.reproduction.part import Part
-from eidrive_reports.reproduction.provenance import read_provenance, write_provenance
+from eidrive_reports.reproduction.provenance import commit, read_provenance, write_provenance
 from eidrive_reports.run_record import RunRecord
 from eidrive_scenario.api.common import write_atomically
 from eidrive_scenario.api.experiments import cores, run_jobs
@@ -66,7 +66,7 @@ def reproduce(
     The report depends on the episodes only, so a second call writes the same files. Raise SettingError if a file
     cannot be written or the record is damaged, and the exceptions of `run_jobs`.
     """
-    start = time.perf_counter()
+    start, checkout = time.perf_counter(), commit()
     read_provenance(out)  # a damaged file is an error before the runs, not after them
     jobs = part.jobs(episodes, detectors)
     with Record.open(out / f"{part.name}.jsonl", restart=restart) as record:
@@ -89,6 +89,7 @@ def reproduce(
             "runs": len(used),
             "all_runs_s": round(done.computed_s, 1),
         },
+        checkout=checkout,
         added=done.added,
         elapsed_s=done.elapsed_s,
         processes=min(workers or cores(), max(1, done.added)),
