@@ -16,7 +16,6 @@ from eidrive_scenario.api.actions import (
     model,
     property_entries,
     same_way,
-    speed_along_axis,
 )
 from eidrive_scenario.api.common import Diagnostic, ScenarioError, suggestion
 
@@ -91,8 +90,6 @@ ACCELERATION_SHARE = 0.7
 """Share of the vehicle's maximum acceleration that is used on a free road."""
 GAIN = 2.5
 """Acceleration at a large gap [m/s²]."""
-ALONG = 0.5
-"""Minimum share of the speed of another vehicle along the own lane, 60°: beyond this angle it crosses the lane."""
 SPEED_CHANGE = 1e-3
 """Speed difference above which another action has set the speed [m/s]."""
 
@@ -159,10 +156,8 @@ class AdaptiveCruise(ControllerModel):
         return min(leads, default=None)
 
     def _speed_of(self, name: str) -> float:
-        """Return the speed of a vehicle [m/s], negative for an oncoming one; of a crossing one, as in esmini."""
-        speed = self.context.speed(name)
-        along = speed_along_axis(self.context, self.actor.name, name, "entity")
-        return math.copysign(speed, along) if abs(along) > ALONG * abs(speed) else speed
+        """Return the speed of a vehicle [m/s], negative for an oncoming one."""
+        return same_way(self.context, self.actor.name, name, "lane") * self.context.speed(name)
 
     def _gap(self, name: str) -> float | None:
         context, me = self.context, self.actor.name
