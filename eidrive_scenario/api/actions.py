@@ -15,6 +15,7 @@ from eidrive_scenario.openscenario.conventions import property_entries as proper
 from eidrive_scenario.openscenario.model.routing import TIME_ATTRIBUTES as TIME_ATTRIBUTES
 from eidrive_scenario.openscenario.model.routing import has_times as has_times
 from eidrive_scenario.openscenario.values.parameters import satisfies_rule as satisfies_rule
+from eidrive_scenario.openscenario.values.scalars import lane_number as lane_number
 from eidrive_scenario.storyboard.context.behaviour import ActionBehaviour as ActionBehaviour
 from eidrive_scenario.storyboard.context.condition import Condition as Condition
 from eidrive_scenario.storyboard.context.condition import EntityCondition as EntityCondition

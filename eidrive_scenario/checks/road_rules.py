@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -18,6 +17,7 @@ from eidrive_scenario.driving.station_declarations import declared_settings
 from eidrive_scenario.driving.station_warnings import areas_off_road, lights_out_of_view
 from eidrive_scenario.errors import Diagnostic, InputError, suggestion
 from eidrive_scenario.openscenario import Scenario, model
+from eidrive_scenario.openscenario.values.scalars import lane_number
 from eidrive_scenario.roads import Pose, PositionError, RoadNetwork
 from eidrive_scenario.roads.model.map_warnings import MapRule
 from eidrive_scenario.storyboard.context.contexts import EntityAbsentError
@@ -88,8 +88,6 @@ ROAD_FILE_RULES: tuple[Rule[RoadNetwork], ...] = (
 
 LENGTH_TOLERANCE = 0.01
 """Maximum rounding error of the length of a road in its file [m]."""
-_LANE_ID = re.compile(r"-?\d{1,10}")
-"""Pattern of an integer of 32 bits. Python refuses to convert thousands of digits."""
 _ADDRESS = "="
 """Part of signal references of ScenarioRunner, such as `pos=x,y` or `id=7`."""
 
@@ -117,9 +115,10 @@ def unknown_lanes(context: RoadLintContext) -> Iterator[Diagnostic]:
     lanes = {number for road in context.roads.roads.values() for part in road.sections for number in part.lanes} - {0}
     for action in context.of(model.LaneChangeAction):
         target = action.lane_change_target.absolute_target_lane
-        if target is None or not _LANE_ID.fullmatch(target.value):
+        lane = None if target is None else lane_number(target.value)
+        if target is None or lane is None:
             continue  # Other texts are errors of the run setup.
-        if int(target.value) not in lanes:
+        if lane not in lanes:
             shown = ", ".join(str(lane) for lane in sorted(lanes))
             yield at(target, f"lane {target.value!r} exists on no road", f"known: {shown}")
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,14 +27,13 @@ from eidrive_scenario.api.actions import (
     TransitionProfile,
     count_lanes,
     facing,
+    lane_number,
     model,
 )
 from eidrive_scenario.api.common import EPSILON, LaneLocation, Pose, ScenarioError
 
 SPACING = 2.0
 """Spacing of the points of a path [m]."""
-_LANE_ID = re.compile(r"-?\d{1,10}")
-"""Pattern of an integer of 32 bits. Python refuses to convert thousands of digits."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +92,8 @@ class LaneChangeAction(ActionBehaviour):
         self._dynamics = self.action.lane_change_action_dynamics
         self._transition = TransitionProfile(model.DynamicsShape.STEP, 0.0, 0.0, 0.0)
         target = self.action.lane_change_target.absolute_target_lane
-        if target is not None and not _LANE_ID.fullmatch(target.value):
+        self._absolute = None if target is None else lane_number(target.value)
+        if target is not None and self._absolute is None:
             raise self.error(f"the target lane is not a number (got {target.value!r}; expected the id of a lane)")
         self._roads = self.require_roads()
         self._lane = 0
@@ -242,9 +241,9 @@ class LaneChangeAction(ActionBehaviour):
 
         Lanes are followed along their links to the road of the reference entity, where ids and directions may differ.
         """
+        if self._absolute is not None:
+            return self._absolute
         target = self.action.lane_change_target
-        if target.absolute_target_lane is not None:
-            return int(target.absolute_target_lane.value)
         assert target.relative_target_lane is not None
         name = target.relative_target_lane.entity_ref
         reference = self.context.location(name)

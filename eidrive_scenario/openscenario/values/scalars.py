@@ -58,6 +58,14 @@ def whole_number(limits: Limits) -> Scalar:
     return Scalar("a whole number", convert, True)
 
 
+def lane_number(text: str) -> int | None:
+    """Return the number of a lane that a text names; None if it is no integer of 32 bits."""
+    try:
+        return int(whole_number(INT).convert(text))
+    except ValueError:
+        return None
+
+
 def _boolean(text: str) -> bool:
     value = _BOOLEANS.get(text.strip(_WHITE_SPACE))
     if value is None:
