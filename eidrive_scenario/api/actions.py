@@ -57,7 +57,6 @@ from eidrive_scenario.storyboard.positions.distances import entity_box as entity
 from eidrive_scenario.storyboard.positions.distances import resolve_coordinate_system as resolve_coordinate_system
 from eidrive_scenario.storyboard.positions.distances import resolve_distance_type as resolve_distance_type
 from eidrive_scenario.storyboard.positions.distances import same_way as same_way
-from eidrive_scenario.storyboard.positions.distances import speed_along_axis as speed_along_axis
 from eidrive_scenario.storyboard.positions.position_types import count_lanes as count_lanes
 from eidrive_scenario.storyboard.positions.position_types import facing as facing
 from eidrive_scenario.storyboard.positions.resolution import referenced_entities as referenced_entities

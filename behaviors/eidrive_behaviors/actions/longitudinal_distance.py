@@ -14,7 +14,6 @@ from eidrive_scenario.api.actions import (
     distance,
     model,
     resolve_coordinate_system,
-    speed_along_axis,
 )
 
 STIFFNESS = 0.4
@@ -36,9 +35,9 @@ class LongitudinalDistanceAction(ActionBehaviour):
     limit, within the limits of speed, acceleration and its rate. Deceleration is a speed change toward 0, also
     backwards. The standard does not specify the course of the distance.
 
-    An actor that moves at an angle to the axis of the distance moves so much farther; a distance along the road without
-    limits carries an actor that faces across it along the road. Only the speed of the other
-    entity along this axis counts.
+    An actor that moves at an angle to the axis of the distance moves so much farther. A distance along the road without
+    limits carries an actor that faces across it along the road. Only the speed of the other entity along this axis
+    counts.
     """
 
     domains = Domain.LONGITUDINAL
@@ -71,7 +70,8 @@ class LongitudinalDistanceAction(ActionBehaviour):
             self.warn(f"no effect while {self.actor.name!r} moves across the axis of the distance")
             return Status.RUNNING
         error /= share
-        then = self._move(error, speed_along_axis(self.context, self.actor.name, self._other, self._frame) / share)
+        other = self.context.speed(self._other) * math.cos(self.context.pose(self._other).h - axes[1])
+        then = self._move(error, other / share)
         reached = abs(then * share) < REACHED or then * error < 0.0
         return Status.SUCCESS if reached and not self.action.continuous else Status.RUNNING
 

@@ -202,21 +202,15 @@ def same_way(context: ConditionContext, a: str, b: str, frame: str) -> float:
 
 
 def axis_headings(context: ConditionContext, a: str, b: str, frame: str) -> tuple[float, float]:
-    """Return the headings of the longitudinal axis of actor `a` at `a` and at actor `b` [rad]."""
-    axis = _own_axis(context, a, frame)
-    return axis, _axis_at(context, a, b, frame, axis)
-
-
-def speed_along_axis(context: ConditionContext, a: str, b: str, frame: str) -> float:
-    """Return the speed of actor `b` along the longitudinal axis of actor `a` [m/s].
+    """Return the headings of the longitudinal axis of actor `a` at `a` and at actor `b` [rad].
 
     In the entity frame the axis of an actor that drives along its road turns with the road.
     """
-    if frame == "entity" and context.roads is not None:
-        here = context.location(a)
-        if here is not None and abs(math.cos(context.pose(a).h - context.roads.pose(here).h)) >= ACROSS:
-            frame = "road"
-    return context.speed(b) * math.cos(context.pose(b).h - axis_headings(context, a, b, frame)[1])
+    axis = _own_axis(context, a, frame)
+    here, roads = context.location(a), context.roads
+    if frame == "entity" and here is not None and roads is not None:
+        frame = "road" if abs(math.cos(axis - roads.pose(here).h)) >= ACROSS else frame
+    return axis, _axis_at(context, a, b, frame, axis)
 
 
 class MovedContext(ConditionContext):
