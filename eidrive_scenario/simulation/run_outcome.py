@@ -170,9 +170,9 @@ def scheduled_end(storyboard: Storyboard, time: float, time_limit: float) -> str
 
     A run whose storyboard ends with an exit command continues for a tick, in which that command ends it.
     """
-    exits = any(command.type in EXITS for command in storyboard.context.commands.custom)
-    if storyboard.ended is not None and not exits:
-        return storyboard.ended
+    ended, commands = storyboard.ended, storyboard.context.commands.custom
+    if ended is not None and not any(command.type in EXITS for command in commands):
+        return ended
     return TIME_LIMIT if time >= time_limit - TIME_TOLERANCE else None
 
 
