@@ -72,22 +72,22 @@ def test_range_follows_height_of_car_in_network_input(letterbox: bool, expected:
 
 @KINDS
 def test_detect_car_in_image_returns_car_in_world(kind: type[LearnedDetector], readings: Readings) -> None:
-    found = create(kind).detect(readings)
-    assert found.time == readings.time
-    assert "car" in found.classes
+    detections = create(kind).detect(readings)
+    assert detections.time == readings.time
+    assert "car" in detections.classes
     center = (14.0 + 1.35 * math.cos(0.4), 1.5 + 1.35 * math.sin(0.4))
-    away = np.hypot(found.boxes[:, 0] - center[0], found.boxes[:, 1] - center[1])
+    away = np.hypot(detections.boxes[:, 0] - center[0], detections.boxes[:, 1] - center[1])
     nearest = int(np.argmin(away))
     assert away[nearest] < 0.75
-    assert found.classes[nearest] == "car"
-    assert found.scores[nearest] > 0.5
-    assert len(found) == 1
+    assert detections.classes[nearest] == "car"
+    assert detections.scores[nearest] > 0.5
+    assert len(detections) == 1
 
 
 @KINDS
 def test_detect_without_lidar_uses_ground_plane(kind: type[LearnedDetector], readings: Readings) -> None:
-    found = create(kind).detect(Readings(readings.time, readings.ego, cameras=readings.cameras))
-    away = np.hypot(found.boxes[:, 0] - 15.24, found.boxes[:, 1] - 2.03)
+    detections = create(kind).detect(Readings(readings.time, readings.ego, cameras=readings.cameras))
+    away = np.hypot(detections.boxes[:, 0] - 15.24, detections.boxes[:, 1] - 2.03)
     assert away.min() < 3.0
 
 
@@ -98,10 +98,10 @@ def test_detect_with_two_lidars_uses_better_position_estimate(kind: type[Learned
     behind = front.points[:, 0] < 0.0
     rear = replace(front, points=front.points[behind], intensity=front.intensity[behind])
     expected = create(kind).detect(readings)
-    found = create(kind).detect(replace(readings, lidars={"rear": rear, "lidar": front}))
-    np.testing.assert_array_equal(found.boxes, expected.boxes)
-    np.testing.assert_array_equal(found.covariance, expected.covariance)
-    assert found.classes == expected.classes
+    detections = create(kind).detect(replace(readings, lidars={"rear": rear, "lidar": front}))
+    np.testing.assert_array_equal(detections.boxes, expected.boxes)
+    np.testing.assert_array_equal(detections.covariance, expected.covariance)
+    assert detections.classes == expected.classes
 
 
 @KINDS
@@ -114,13 +114,13 @@ def test_detect_omits_image_boxes_that_no_body_fills(
     detector.load_weights()
     network = detector._network
     assert network is not None
-    found = network.find(readings.cameras["camera"].rgb)
-    stripe = np.concatenate([found.boxes, [[161.0, 313.0, 262.0, 384.0]]])
-    false = ImageDetections(stripe, np.append(found.scores, 0.5), (*found.classes, "truck"))
+    detections = network.find(readings.cameras["camera"].rgb)
+    stripe = np.concatenate([detections.boxes, [[161.0, 313.0, 262.0, 384.0]]])
+    false = ImageDetections(stripe, np.append(detections.scores, 0.5), (*detections.classes, "truck"))
     monkeypatch.setattr(network, "find_in", lambda reading: false)
     detected = detector.detect(replace(readings, lidars={}))
     assert "truck" not in detected.classes
-    assert len(detected) == len(found.boxes) > 0
+    assert len(detected) == len(detections.boxes) > 0
     assert detector.image_detections["camera"] is false
 
 
@@ -179,18 +179,18 @@ def test_without_duplicates_keeps_box_with_highest_score() -> None:
     first_box, second_box = [10.0, 0.0, 0.75, 4.5, 1.8, 1.5, 0.0], [20.0, 0.0, 0.75, 4.5, 1.8, 1.5, 0.0]
     beside = [11.0, 0.2, 0.75, 4.5, 1.8, 1.5, 0.1]
     parts = [part([first_box, second_box], [0.6, 0.9], "car"), part([beside], [0.8], "truck")]
-    found = without_duplicates(Detections.concatenate(1.0, parts))
-    assert found.scores.tolist() == [0.9, 0.8]
-    assert found.classes == ("car", "truck")
+    distinct = without_duplicates(Detections.concatenate(1.0, parts))
+    assert distinct.scores.tolist() == [0.9, 0.8]
+    assert distinct.classes == ("car", "truck")
     assert len(without_duplicates(Detections.concatenate(2.0, []))) == 0
 
 
 def test_detect_with_onnx_weights_returns_configured_classes(readings: Readings) -> None:
     settings = {"weights": str(ONNX), "classes": ["truck", "car"], "input_size": [96, 64], "confidence": 0.3}
     parsed = parse_settings(LearnedSettings, settings)
-    found = YoloDetector(parsed)
-    found.setup(DetectorContext(car("Ego"), SENSORS))
-    assert set(found.detect(readings).classes) <= {"car"}
+    detector = YoloDetector(parsed)
+    detector.setup(DetectorContext(car("Ego"), SENSORS))
+    assert set(detector.detect(readings).classes) <= {"car"}
 
 
 @pytest.mark.parametrize(
