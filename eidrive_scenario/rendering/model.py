@@ -64,12 +64,13 @@ class Model:
 
 
 class Cells(NamedTuple):
-    """Grid cells by which a large model is sorted: first triangles, counts, and spheres (center, radius)."""
+    """Grid cells by which a large model is sorted: first triangles, counts, spheres (center, radius), least heights."""
 
     first: Integers
     counts: Integers
     center: Array
     radius: Array
+    low: Array
 
     def rows(self, chosen: NDArray[np.bool_]) -> Integers:
         """Return the triangles of the selected cells."""
@@ -160,7 +161,8 @@ def gridded(source: Model) -> Model:
     low = np.minimum.reduceat(corners.min(axis=1), first, axis=0)
     high = np.maximum.reduceat(corners.max(axis=1), first, axis=0)
     by_cell = _model(_Columns._make(column[order] for column in _Columns.of(source)), source.materials)
-    return replace(by_cell, cells=Cells(first, count, (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2))
+    radius = np.linalg.norm(high - low, axis=1) / 2
+    return replace(by_cell, cells=Cells(first, count, (low + high) / 2, radius, low[:, 2]))
 
 
 def placed(part: Model, rotation: Array, position: Array) -> Model:

@@ -23,6 +23,7 @@ from eidrive_scenario.rendering.meshes.signs import sign, sign_face
 from eidrive_scenario.rendering.meshes.solids import polygon
 from eidrive_scenario.rendering.model import Light, MeshInstance, Model, gridded, merged, model, placed
 from eidrive_scenario.rendering.renderer import ImageContent, Renderer, Subjects
+from eidrive_scenario.rendering.shadows import REACH
 from eidrive_scenario.rendering.surfaces import LEVEL, RoadPlane
 from eidrive_scenario.roads import RoadNetwork, surface_meshes
 from eidrive_scenario.roads.model.signal_states import GREEN, RED, YELLOW, lamp_colors, lamps, lit
@@ -189,7 +190,8 @@ class Visuals:
             glowing = {"window_lit": WINDOW_LIGHT} if weather.lamps_on and weather.sun_elevation < 3.0 else {}
             standing.insert(0, MeshInstance(self._buildings, np.eye(3), self._origin, -1, glowing))
         subjects = Subjects(self._ground_around(pose[:2, 3]), standing, actors, ignored, self._decks)
-        content = ImageContent(subjects, beams, weather, pose, pinhole, self._road_below(*pose[:3, 3].tolist()))
+        ground = self._road_below(*pose[:3, 3].tolist())
+        content = ImageContent(subjects, beams, weather, pose, pinhole, ground, self._lowest_road(pose[:2, 3], ground))
         return SceneImage(self._renderer, content)
 
     def _road_below(self, x: float, y: float, z: float) -> RoadPlane:
@@ -203,6 +205,15 @@ class Visuals:
             below = [pose for pose in map(roads.pose, roads.locations_at(x, y)) if pose.z <= z]
             pose = max(below, key=lambda pose: pose.z, default=pose)
         return RoadPlane(pose.z, rotation_matrix(pose.h, pose.p, pose.r)[:, 2])
+
+    def _lowest_road(self, camera: Array, below: RoadPlane) -> float:
+        """Return the height of the lowest road whose shadows a camera at a position (2,) shows [m]."""
+        heights = [below.height]
+        for part in self._decks:
+            if (cells := part.model.cells) is not None:
+                gap = np.linalg.norm(cells.center[:, :2] + part.position[:2] - camera, axis=1) - cells.radius
+                heights += cells.low[gap <= REACH].tolist()
+        return min(heights)
 
     def _ground_around(self, camera: Array) -> list[MeshInstance]:
         """Return the ground for a camera at a position (2,): the land follows a camera that is beyond the roads."""

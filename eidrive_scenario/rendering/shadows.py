@@ -142,14 +142,17 @@ def _mark_new(
                 changed[pixel] |= heights[row, left + 1] > before[row, left + 1]
 
 
-def shadow_grid(towards: Array, view: CameraView, ground: float) -> ShadowGrid | None:
-    """Return the grid for the view of a camera above a road of this height [m]; None if the sun is too low."""
+def shadow_grid(towards: Array, view: CameraView, ground: float, lowest: float) -> ShadowGrid | None:
+    """Return the grid for the view of a camera; None if the sun is too low.
+
+    ground, lowest  heights of the road below the camera, and of the lowest one within reach [m]
+    """
     if towards[2] < _LOWEST:
         return None
     first = np.cross(towards, (0.0, 0.0, 1.0) if abs(towards[2]) < 0.99 else (1.0, 0.0, 0.0))
     first /= np.linalg.norm(first)
     axes = np.stack([first, np.cross(towards, first)])
-    seen = _seen_ground(view, ground)
+    seen = _seen_ground(view, ground, lowest)
     flat = seen @ axes.T
     low, high = flat.min(axis=0) - 0.5, flat.max(axis=0) + 0.5
     pixels = min(max(1.2 * view.pinhole.width, _COARSEST), _FINEST)
@@ -159,7 +162,7 @@ def shadow_grid(towards: Array, view: CameraView, ground: float) -> ShadowGrid |
     return ShadowGrid(axes, towards, low, high, width, height, scale, base, view.position)
 
 
-def _seen_ground(view: CameraView, ground: float) -> Array:
+def _seen_ground(view: CameraView, ground: float, lowest: float) -> Array:
     """Return points (M, 3) relative to the camera around the view within reach, near the ground and above."""
     pinhole, pose = view.pinhole, view.pose
     columns = np.array([0.0, 0.5, 1.0]) * pinhole.width
@@ -168,14 +171,14 @@ def _seen_ground(view: CameraView, ground: float) -> Array:
                      for c in columns for r in rows])  # fmt: skip
     rays = rays / np.linalg.norm(rays, axis=1, keepdims=True) @ pose[:3, :3].T
     # Lower roads may be visible from a hill.
-    lowest, highest = min(ground, 0.0) - pose[2, 3] - 0.5, max(ground - pose[2, 3] + 6.0, 1.0)
+    low, high = lowest - pose[2, 3] - 0.5, max(ground - pose[2, 3] + 6.0, 1.0)
     points = [np.zeros(3)]
     for ray in rays:
         reach = REACH
         if ray[2] < -1e-9:
-            reach = min(reach, lowest / ray[2])
+            reach = min(reach, low / ray[2])
         elif ray[2] > 1e-9:
-            reach = min(reach, highest / ray[2])
+            reach = min(reach, high / ray[2])
         points.append(ray * reach)
     return np.array(points)
 

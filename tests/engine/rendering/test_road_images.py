@@ -129,20 +129,22 @@ def test_camera_near_deck_mirrors_in_the_road_below(bridge: World, z: float, mir
     assert image.content.ground.height == mirror
 
 
-def shadow_pixels(height: float) -> int:
-    """Return the number of pixels in the shadow of a crate, on a road of this height [m] and in the same view."""
+def shadow_pixels(height: float, above: float = 1.6, pitch: float = 0.05, distance: float = 12.0) -> int:
+    """Return the number of pixels in the shadow of a crate at a distance, on a road of this height [m]."""
     road = road_xml(length=200.0, lanes=LANES, profiles=elevation_xml(height))
-    crate = ActorSpec("Crate", "box", "misc", (2.0, 2.0, 2.0), (0.0, 0.0, 1.0))
+    size = distance / 6.0
+    crate = ActorSpec("Crate", "box", "misc", (size, size, size), (0.0, 0.0, size / 2.0))
     with World(RoadNetwork.parse(map_xml(road)), picture_maker=picture_maker) as world:
         world.set_weather(Weather(sun_azimuth=0.0, sun_elevation=35.0, cloud_cover=0.0))
-        pose = looking(20.0, -1.75, height + 1.6, 0.05)
+        pose = looking(20.0, -1.75, height + above, pitch)
         before = world.radiance(pose, PINHOLE).luminance
-        world.add(crate, Placement(32.0, -1.75, height))
+        world.add(crate, Placement(20.0 + distance, -1.75, height))
         image = world.radiance(pose, PINHOLE)
     return int(((image.luminance < 0.5 * before).all(axis=-1) & (image.segmentation < 0)).sum())
 
 
-@pytest.mark.parametrize("height", [-50.0, -3.0])
-def test_shadow_on_low_road_is_that_on_level_road(height: float) -> None:
-    assert shadow_pixels(0.0) > 30
-    assert shadow_pixels(height) == pytest.approx(shadow_pixels(0.0), rel=0.1)
+@pytest.mark.parametrize("height", [-50.0, -3.0, 300.0])
+@pytest.mark.parametrize("view", [(1.6, 0.05, 12.0), (6.0, 0.9, 3.0)], ids=["ahead", "down"])
+def test_shadow_at_any_height_is_that_on_level_road(height: float, view: tuple[float, float, float]) -> None:
+    assert shadow_pixels(0.0, *view) > 20
+    assert shadow_pixels(height, *view) == pytest.approx(shadow_pixels(0.0, *view), rel=0.1)
