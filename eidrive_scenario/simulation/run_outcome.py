@@ -168,12 +168,12 @@ def end_reason(state: RunState, storyboard: Storyboard, time: float, time_limit:
 def scheduled_end(storyboard: Storyboard, time: float, time_limit: float) -> str | None:
     """Return the reason for which the storyboard or the time limit [s] ends a run at this time [s], or None.
 
-    A run whose storyboard ends with an exit command continues for a tick, in which that command ends it.
+    With an exit command in the last tick the run continues for another tick, in which that command ends it.
     """
-    ended, commands = storyboard.ended, storyboard.context.commands.custom
-    if ended is not None and not any(command.type in EXITS for command in commands):
-        return ended
-    return TIME_LIMIT if time >= time_limit - TIME_TOLERANCE else None
+    end = storyboard.ended or (TIME_LIMIT if time >= time_limit - TIME_TOLERANCE else None)
+    if end is not None and any(command.type in EXITS for command in storyboard.context.commands.custom):
+        return None
+    return end
 
 
 def _is_failed_early(reason: str) -> bool:

@@ -92,14 +92,16 @@ def test_exit_command_judges_a_run(bare: Path, command: str, code: int) -> None:
     assert run_file(bare).exit_code == code
 
 
+@pytest.mark.parametrize("limit", [60.0, 1.0])
 @pytest.mark.parametrize(("command", "code"), [("exitSuccess", 0), ("exitFailure", 1)])
-def test_exit_command_of_the_last_event_judges_a_run(command: str, code: int) -> None:
-    """The storyboard is complete in the time step in which this event executes the command."""
+def test_exit_command_of_the_last_time_step_judges_a_run(command: str, code: int, limit: float) -> None:
+    """The storyboard is complete, or the limit is reached, in the time step in which the event executes the command."""
     action = f'<UserDefinedAction><CustomCommandAction type="{command}"/></UserDefinedAction>'
     event = event_xml("Exit", action, trigger_xml(condition_xml(time_xml(1.0, "greaterOrEqual"))))
-    story = acts_xml(act_xml(group_xml(maneuver_xml(event))))
+    waiting = event_xml("Wait", action, trigger_xml(condition_xml(time_xml(9.0, "greaterOrEqual"))))
+    story = acts_xml(act_xml(group_xml(maneuver_xml(event if limit > 1.0 else event + waiting))))
     scenario = scenario_xml(entities=round_car_xml("Ego"), story=story, stop="")
-    result = run_file(scenario, settings=RunSettings(criteria={"time_limit": {"within": 60}}))
+    result = run_file(scenario, settings=RunSettings(criteria={"time_limit": {"within": 60}}, time_limit=limit))
     assert (result.exit_code, result.end_reason) == (code, f"command: {command}")
 
 
