@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from operator import attrgetter
 from pathlib import Path
@@ -52,15 +53,17 @@ COLUMNS = (
 def table(runs: Iterable[DrivenRun], *, has_reference: bool) -> str:
     """Return the runs as a Markdown table, one line per file in order of appearance; distances are means.
 
+    Runs without a result have a line per error.
+
     has_reference  whether runs with a contact by own fault are compared with a reference driver
     """
     lines: list[Sequence[object]] = []
     evaluated = [run for run in runs if not run.excluded]
     for file, mine in group_by(evaluated, attrgetter("file")).items():
-        stacks = [run for run in mine if run.arm == STACK]
-        errors = sorted({run.error for run in stacks if run.error})
-        if errors:
-            lines.append((file, len(stacks), errors[0] + " |" * (len(COLUMNS) - 3)))  # other cells are empty
+        errors = Counter(run.error for run in mine if run.arm == STACK and run.error)
+        lines += [(file, count, error, *[""] * (len(COLUMNS) - 3)) for error, count in sorted(errors.items())]
+        stacks = [run for run in mine if run.arm == STACK and not run.error]
+        if not stacks:
             continue
         failed = sorted({name for run in stacks for name in run.failed})
         criteria = ", ".join(f"`{name}`" for name in failed) or ("none" if any(run.judged for run in stacks) else "-")

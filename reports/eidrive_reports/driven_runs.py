@@ -179,7 +179,7 @@ def observed_run(
     return result, motion
 
 
-case_of = attrgetter("group", "file", "number", "seed", "planner")
+case_of = attrgetter("group", "file", "number", "seed", "planner", "drive")
 """Function that returns the identity of a run, or of its job, except for its arm."""
 STACK, REFERENCE = "stack", "reference"
 DEFAULT = "behavior"
@@ -194,13 +194,17 @@ DRAWS = 20
 
 @dataclass(frozen=True)
 class DrivenJob(Job):
-    """Run of the scenario of `file` in which `drive` is judged; `number` is that of the run in its distribution."""
+    """Run of the scenario of `file` in which `drive` is judged; `number` is that of the run in its distribution.
+
+    `reference` names the controller and its model in a run of the reference driver.
+    """
 
     file: str
     number: int
     drive: str
     group: str = ""
     planner: str = DEFAULT
+    reference: str = ""
 
 
 class DrivenRun(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -215,6 +219,7 @@ class DrivenRun(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     error         message of a run without a result, else ""
     planner       planner of the stack, also of that with which the reference driver is compared
     excluded      whether the values violate the constraints of a parameter, so that the run is not evaluated
+    drive         judged entity;  reference  controller and model of the reference driver
     """
 
     file: str
@@ -235,6 +240,8 @@ class DrivenRun(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     excluded: bool = False
     group: str = ""
     planner: str = DEFAULT
+    drive: str = ""
+    reference: str = ""
 
 
 def jobs_of_file(
@@ -251,7 +258,8 @@ def jobs_of_file(
         if reference is not None:
             arms[REFERENCE] = RunSettings(controllers=reference, **common)  # type: ignore[arg-type]
         for arm, settings in arms.items():
-            yield DrivenJob(str(scenario), arm, 1, settings, path.name, number, drive, group, planner)
+            driver = ", ".join(map("=".join, settings.controllers.items()))
+            yield DrivenJob(str(scenario), arm, 1, settings, path.name, number, drive, group, planner, driver)
 
 
 def _runs(path: Path, samples: int) -> Iterator[tuple[int, Path, dict[str, str | Assignment]]]:
@@ -288,7 +296,8 @@ def run_of(job: DrivenJob) -> DrivenRun:
     values = {
         name: value.text if isinstance(value, Assignment) else value for name, value in job.settings.parameters.items()
     }
-    run = DrivenRun(job.file, job.number, job.arm, job.seed, values, group=job.group, planner=job.planner)
+    named = {name: getattr(job, name) for name in ("group", "planner", "drive", "reference")}
+    run = DrivenRun(job.file, job.number, job.arm, job.seed, values, **named)
     try:
         result, motion = observed_run(job.scenario, job.drive, seed=job.seed, settings=job.settings)
     except ConstraintError:
@@ -314,7 +323,7 @@ class DrivenRecord(RunRecord[DrivenRun]):
     """Record of driven runs."""
 
     kind = DrivenRun
-    key = attrgetter("group", "file", "number", "seed", "planner", "arm")
+    key = attrgetter("group", "file", "number", "seed", "planner", "drive", "arm", "reference")
     hint = "remove the line, or start again without --resume"
 
     def encode(self, run: DrivenRun) -> bytes:

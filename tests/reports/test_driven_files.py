@@ -42,7 +42,7 @@ def read(record: Path) -> list[DrivenRun]:
 
 
 def run(arm: str = STACK, number: int = 0, *, file: str = "a.xosc", **given: object) -> DrivenRun:
-    return DrivenRun(file, number, arm, 1, **given)  # type: ignore[arg-type]
+    return DrivenRun(file, number, arm, 1, drive="Ego", **given)  # type: ignore[arg-type]
 
 
 def write(folder: Path, ahead: float) -> Path:
@@ -64,12 +64,14 @@ def test_table_counts_collisions_of_the_stack_only() -> None:
         run(REFERENCE, 1, collided=True),
         run(number=2, excluded=True),
         run(file="b.xosc", failed=("keep_lane",), judged=2),
-        run(file="c.xosc", error="c.xosc:3: no road"),
+        *(run(number=n, file="c.xosc", error="c.xosc:3: a|b") for n in range(2)),
+        run(number=2, file="c.xosc", distance=50.0),
     ]
     assert table(runs, has_reference=True).splitlines()[2:] == [
         "| a.xosc | 2 | 2 | 2 | 1 | 150 | 8.0 | - |",
         "| b.xosc | 1 | 0 | 0 | 0 | 0 | 0.0 | `keep_lane` |",
-        "| c.xosc | 1 | c.xosc:3: no road | | | | | |",
+        "| c.xosc | 2 | c.xosc:3: a\\|b | | | | | |",
+        "| c.xosc | 1 | 0 | 0 | 0 | 50 | 0.0 | - |",
     ]
 
 

@@ -13,8 +13,8 @@ from eidrive_scenario.errors import SettingError
 from eidrive_scenario.simulation import RunSettings
 
 
-def job(number: int, planner: str = "behavior") -> DrivenJob:
-    return DrivenJob("a.xosc", STACK, 1, RunSettings(), "a.xosc", number, "Ego", planner=planner)
+def job(number: int, planner: str = "behavior", drive: str = "Ego") -> DrivenJob:
+    return DrivenJob("a.xosc", STACK, 1, RunSettings(), "a.xosc", number, drive, planner=planner)
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def done(monkeypatch: pytest.MonkeyPatch) -> list[DrivenJob]:
     def run_of(one: DrivenJob) -> DrivenRun:
         jobs.append(one)
         error = f"run {one.number}\u2028without a result"
-        return DrivenRun(one.file, one.number, one.arm, one.seed, error=error, planner=one.planner)
+        return DrivenRun(one.file, one.number, one.arm, one.seed, error=error, planner=one.planner, drive=one.drive)
 
     monkeypatch.setattr(driven_runs, "run_of", run_of)
     return jobs
@@ -60,12 +60,14 @@ def test_damaged_line_is_an_error_with_its_number(tmp_path: Path, done: list[Dri
         recorded([job(0)], record)
 
 
-def test_runs_of_another_planner_are_not_taken_from_the_record(tmp_path: Path, done: list[DrivenJob]) -> None:
+def test_runs_of_another_planner_or_vehicle_are_not_taken_from_the_record(
+    tmp_path: Path, done: list[DrivenJob]
+) -> None:
     record = tmp_path / "record.jsonl"
-    recorded([job(0)], record)
-    (run,) = recorded([job(0, "route")], record)
-    assert run.planner == "route"
-    assert [one.planner for one in done] == ["behavior", "route"]
+    for wanted in (job(0), job(0, "route"), job(0, drive="Truck")):
+        (run,) = recorded([wanted], record)
+        assert (run.planner, run.drive) == (wanted.planner, wanted.drive)
+    assert len(done) == 3
 
 
 def test_files_of_the_same_name_are_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
