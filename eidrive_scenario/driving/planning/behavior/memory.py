@@ -29,6 +29,9 @@ LARGEST_ERROR = 3.0
 """Maximum standard deviation that is considered [m]; above it the position says nothing."""
 SMOOTHING = 0.4
 """Weight of the newest difference quotient in the velocity of an object whose detector estimates none."""
+REPEATED = 1.0
+"""Maximum time for which a position without a velocity that does not change is that of one sensor reading [s]. Sensors
+are slower than decisions, and two readings of a real sensor differ by noise."""
 VELOCITY_ERROR = 1.5
 """Assumed standard deviation of a velocity per standard deviation of the position [1/s]."""
 AXIAL_SPEED = 1.0
@@ -95,6 +98,10 @@ class KnownObject(msgspec.Struct):
     """Courses that it was last predicted to follow."""
     kinds: dict[str, float] = {}
     """Shares of the classes that were observed over about the last second; empty while there is only one."""
+    measured: tuple[float, float] | None = None
+    """Last measured position [m], if the detector estimates no velocity."""
+    measured_at: float = math.inf
+    """Time since which this position is given [s]."""
 
     @property
     def speed(self) -> float:
@@ -146,19 +153,25 @@ class KnownObject(msgspec.Struct):
         self.acceleration = min(self.acceleration, 0.0)
 
     def observe(self, fresh: KnownObject, step: float, shares: _Shares) -> None:
-        """Update the object by its new observation.
+        """Update the object by its new observation; one that repeats the measured position is none.
 
         step    time since the last decision [s]
         shares  weights of a new observation after this time
         """
+        if fresh.measured is not None:
+            if fresh.measured == self.measured and fresh.seen - self.measured_at < REPEATED - TIME_TOLERANCE:
+                self.row, self.seen, self.hidden_since = fresh.row, fresh.seen, None
+                return
+            if step > 0.0 and fresh.seen - self.measured_at > step:
+                step = fresh.seen - self.measured_at
+                shares = _Shares.of(step)
         before = self.speed if self.has_velocity else None
         if fresh.has_velocity:
             self.vx, self.vy = fresh.vx, fresh.vy
         elif step > 0.0:
             share = SMOOTHING if self.has_velocity else 1.0
-            elapsed = max(fresh.seen - self.seen, step)
-            self.vx += share * (fresh.x - self.x) / elapsed
-            self.vy += share * (fresh.y - self.y) / elapsed
+            self.vx += share * (fresh.x - self.x) / step
+            self.vy += share * (fresh.y - self.y) / step
         speed = self.speed
         if before is not None and step > 0.0:
             change = (speed - before) / step
@@ -168,6 +181,7 @@ class KnownObject(msgspec.Struct):
         self.hidden_since = None
         self._classify(fresh.kind, shares.kind)
         self.row, self.seen = fresh.row, fresh.seen
+        self.measured, self.measured_at = fresh.measured, fresh.seen
         self.x, self.y, self.yaw = fresh.x, fresh.y, fresh.yaw
         self.length, self.width = fresh.length, fresh.width
         self.z = fresh.z
@@ -250,6 +264,9 @@ class ObjectMemory:
         ahead: Array = np.array([(known_object.x, known_object.y) for known_object in self._objects])
         positions: Array = np.array([(known_object.x, known_object.y) for known_object in observed])
         gap = np.hypot(positions[:, None, 0] - ahead[None, :, 0], positions[:, None, 1] - ahead[None, :, 1])
+        for index, fresh_object in enumerate(observed):
+            if fresh_object.measured is not None:
+                gap[index, [fresh_object.measured == known_object.measured for known_object in self._objects]] = 0.0
         bottom, former = (np.array([known_object.z for known_object in group]) for group in (observed, self._objects))
         fresh, earlier = ((gap < GATE) & (np.abs(bottom[:, None] - former) < OTHER_LEVEL)).nonzero()
         order = gap[fresh, earlier].argsort(kind="stable")
@@ -309,6 +326,7 @@ def _objects_of(detections: Detections, now: float, least: float) -> list[KnownO
         x, y, error = x + vx * age, y + vy * age, min(error + SPEED_ERROR * age, LARGEST_ERROR)
         observation = KnownObject(row, kind, x, y, yaw, length, width, vx, vy, moving, error, existence[row], now)
         observation.first_seen, observation.mean_place, observation.mean_speed = now, (x, y), observation.speed
+        observation.measured, observation.measured_at = None if moving else (x, y), now
         observation.z = z - height / 2.0
         if variance > 0.0:
             observation.ellipse = ellipse

@@ -38,6 +38,21 @@ def test_velocity_of_a_lost_object_is_that_since_its_last_observation() -> None:
     assert (known.vx, known.vy) == pytest.approx((4.0, 0.0))
 
 
+@pytest.mark.parametrize("rate", [20, 10, 5])
+def test_readings_that_several_decisions_get_are_one_observation(rate: int) -> None:
+    """A sensor is up to four times slower than the decisions; the car drives at 8 m/s, then brakes with 2 m/s²."""
+    objects = memory()
+    for tick in range(100):
+        now = 0.05 * tick
+        read = math.floor(now * rate + 1e-6) / rate
+        braking = max(read - 2.0, 0.0)
+        box = KnownBox(8.0 * read - braking**2, vx=math.nan, vy=math.nan)
+        (known,) = objects.update(detections(now, box), now)
+        if 1.0 < now < 2.0:
+            assert (known.x, known.vx) == pytest.approx((8.0 * now, 8.0), abs=1e-6)
+    assert known.acceleration == pytest.approx(-2.0, rel=0.1)
+
+
 def test_measured_velocity_is_taken_as_it_is() -> None:
     objects = memory()
     for now in (0.0, 0.1):
