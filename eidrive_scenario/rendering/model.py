@@ -64,13 +64,14 @@ class Model:
 
 
 class Cells(NamedTuple):
-    """Grid cells by which a large model is sorted: first triangles, counts, spheres (center, radius), least heights."""
+    """Grid cells by which a large model is sorted: first triangles, counts, spheres (center, radius), height bounds."""
 
     first: Integers
     counts: Integers
     center: Array
     radius: Array
     low: Array
+    high: Array
 
     def rows(self, chosen: NDArray[np.bool_]) -> Integers:
         """Return the triangles of the selected cells."""
@@ -162,7 +163,7 @@ def gridded(source: Model) -> Model:
     high = np.maximum.reduceat(corners.max(axis=1), first, axis=0)
     by_cell = _model(_Columns._make(column[order] for column in _Columns.of(source)), source.materials)
     radius = np.linalg.norm(high - low, axis=1) / 2
-    return replace(by_cell, cells=Cells(first, count, (low + high) / 2, radius, low[:, 2]))
+    return replace(by_cell, cells=Cells(first, count, (low + high) / 2, radius, low[:, 2], high[:, 2]))
 
 
 def placed(part: Model, rotation: Array, position: Array) -> Model:

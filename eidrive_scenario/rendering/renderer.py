@@ -61,7 +61,7 @@ class ImageContent(NamedTuple):
 
     pose    (4, 4) camera to world, x right, y down, z forward
     ground  plane of the road below the camera, for reflections
-    lowest  height of the lowest road within reach of the shadows [m]
+    relief  heights of the lowest and the highest road within reach of the shadows [m]
     """
 
     subjects: Subjects
@@ -70,7 +70,7 @@ class ImageContent(NamedTuple):
     pose: Array
     pinhole: Pinhole
     ground: RoadPlane
-    lowest: float
+    relief: tuple[float, float]
 
 
 class _Visible(NamedTuple):
@@ -131,10 +131,10 @@ class Renderer:
 
         Scenery is cached from the second image with the same scenery on.
         """
-        subjects, beams, weather, pose, pinhole, ground, lowest = content
+        subjects, beams, weather, pose, pinhole, ground, relief = content
         light = daylight(weather)
         view = CameraView(pose, pinhole)
-        grid = shadow_grid(light.towards, view, ground.height, lowest) if light.sun.any() else None
+        grid = shadow_grid(light.towards, view, *relief) if light.sun.any() else None
         at = Circumstances(view, weather, light, dome(weather), grid)
         felt = beams if float(light.ground.max()) < DAYLIGHT else ()
         cached = self._cached(subjects, at) if self.MOST_KEPT > 0 else None

@@ -191,7 +191,7 @@ class Visuals:
             standing.insert(0, MeshInstance(self._buildings, np.eye(3), self._origin, -1, glowing))
         subjects = Subjects(self._ground_around(pose[:2, 3]), standing, actors, ignored, self._decks)
         ground = self._road_below(*pose[:3, 3].tolist())
-        content = ImageContent(subjects, beams, weather, pose, pinhole, ground, self._lowest_road(pose[:2, 3], ground))
+        content = ImageContent(subjects, beams, weather, pose, pinhole, ground, self._relief(pose[:2, 3], ground))
         return SceneImage(self._renderer, content)
 
     def _road_below(self, x: float, y: float, z: float) -> RoadPlane:
@@ -206,14 +206,14 @@ class Visuals:
             pose = max(below, key=lambda pose: pose.z, default=pose)
         return RoadPlane(pose.z, rotation_matrix(pose.h, pose.p, pose.r)[:, 2])
 
-    def _lowest_road(self, camera: Array, below: RoadPlane) -> float:
-        """Return the height of the lowest road whose shadows a camera at a position (2,) shows [m]."""
+    def _relief(self, camera: Array, below: RoadPlane) -> tuple[float, float]:
+        """Return the heights of the lowest and the highest road whose shadows a camera at a position (2,) shows [m]."""
         heights = [below.height]
         for part in self._decks:
             if (cells := part.model.cells) is not None:
                 gap = np.linalg.norm(cells.center[:, :2] + part.position[:2] - camera, axis=1) - cells.radius
-                heights += cells.low[gap <= REACH].tolist()
-        return min(heights)
+                heights += [*cells.low[gap <= REACH].tolist(), *cells.high[gap <= REACH].tolist()]
+        return min(heights), max(heights)
 
     def _ground_around(self, camera: Array) -> list[MeshInstance]:
         """Return the ground for a camera at a position (2,): the land follows a camera that is beyond the roads."""

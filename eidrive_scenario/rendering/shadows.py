@@ -142,17 +142,17 @@ def _mark_new(
                 changed[pixel] |= heights[row, left + 1] > before[row, left + 1]
 
 
-def shadow_grid(towards: Array, view: CameraView, ground: float, lowest: float) -> ShadowGrid | None:
+def shadow_grid(towards: Array, view: CameraView, lowest: float, highest: float) -> ShadowGrid | None:
     """Return the grid for the view of a camera; None if the sun is too low.
 
-    ground, lowest  heights of the road below the camera, and of the lowest one within reach [m]
+    lowest, highest  heights of the roads within reach [m]
     """
     if towards[2] < _LOWEST:
         return None
     first = np.cross(towards, (0.0, 0.0, 1.0) if abs(towards[2]) < 0.99 else (1.0, 0.0, 0.0))
     first /= np.linalg.norm(first)
     axes = np.stack([first, np.cross(towards, first)])
-    seen = _seen_ground(view, ground, lowest)
+    seen = _seen_ground(view, lowest, highest)
     flat = seen @ axes.T
     low, high = flat.min(axis=0) - 0.5, flat.max(axis=0) + 0.5
     pixels = min(max(1.2 * view.pinhole.width, _COARSEST), _FINEST)
@@ -162,16 +162,17 @@ def shadow_grid(towards: Array, view: CameraView, ground: float, lowest: float) 
     return ShadowGrid(axes, towards, low, high, width, height, scale, base, view.position)
 
 
-def _seen_ground(view: CameraView, ground: float, lowest: float) -> Array:
+def _seen_ground(view: CameraView, lowest: float, highest: float) -> Array:
     """Return points (M, 3) relative to the camera around the view within reach, near the ground and above."""
     pinhole, pose = view.pinhole, view.pose
-    columns = np.array([0.0, 0.5, 1.0]) * pinhole.width
-    rows = np.array([0.0, 0.5, 1.0]) * pinhole.height
-    rays = np.array([((c - pinhole.center_x) / pinhole.focal, (r - pinhole.center_y) / pinhole.focal, 1.0)
-                     for c in columns for r in rows])  # fmt: skip
+    columns = (np.array([0.0, 0.5, 1.0]) * pinhole.width - pinhole.center_x) / pinhole.focal
+    rows = (np.array([0.0, 0.5, 1.0]) * pinhole.height - pinhole.center_y) / pinhole.focal
+    right, down, ahead = pose[2, :3].tolist()
+    # The farthest ground is at the horizon, if that is in the image.
+    horizon = np.clip([-(ahead + right * column) / (down or 1.0) for column in columns], rows[0], rows[-1])
+    rays = np.array([(x, y, 1.0) for x, level in zip(columns, horizon, strict=True) for y in (*rows, level)])
     rays = rays / np.linalg.norm(rays, axis=1, keepdims=True) @ pose[:3, :3].T
-    # Lower roads may be visible from a hill.
-    low, high = lowest - pose[2, 3] - 0.5, max(ground - pose[2, 3] + 6.0, 1.0)
+    low, high = lowest - pose[2, 3] - 0.5, max(highest - pose[2, 3] + 6.0, 1.0)
     points = [np.zeros(3)]
     for ray in rays:
         reach = REACH

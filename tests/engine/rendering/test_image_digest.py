@@ -251,7 +251,8 @@ def small_content() -> ImageContent:
     instance = MeshInstance(small_model(), np.eye(3), np.zeros(3), 1, {"paint": (1.0, 2.0, 3.0)})
     beam = Beam(np.zeros(3), np.eye(3), 0.5, False)
     subjects = Subjects([instance], [instance], [instance], [instance], [instance])
-    return ImageContent(subjects, [beam], Weather(), np.eye(4), Street.pinhole, RoadPlane(0.5, np.eye(3)[2]), 0.25)
+    road = RoadPlane(0.5, np.eye(3)[2])
+    return ImageContent(subjects, [beam], Weather(), np.eye(4), Street.pinhole, road, (0.25, 0.75))
 
 
 def variants(value: Any) -> list[Any]:

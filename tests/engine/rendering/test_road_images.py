@@ -129,16 +129,18 @@ def test_camera_near_deck_mirrors_in_the_road_below(bridge: World, z: float, mir
     assert image.content.ground.height == mirror
 
 
-def shadow_pixels(height: float, above: float = 1.6, pitch: float = 0.05, distance: float = 12.0) -> int:
-    """Return the number of pixels in the shadow of a crate at a distance, on a road of this height [m]."""
-    road = road_xml(length=200.0, lanes=LANES, profiles=elevation_xml(height))
-    size = distance / 6.0
+def shadow_pixels(
+    height: float, above: float = 1.6, pitch: float = 0.05, distance: float = 12.0, slope: float = 0.0
+) -> int:
+    """Return the number of pixels in the shadow of a crate at a distance, on a road of this height [m] and slope."""
+    road = road_xml(length=200.0, lanes=lanes_xml(1, 1, 20.0), profiles=elevation_xml(height, slope))
+    size, tilt = distance / 6.0, -math.atan(slope)
     crate = ActorSpec("Crate", "box", "misc", (size, size, size), (0.0, 0.0, size / 2.0))
     with World(RoadNetwork.parse(map_xml(road)), picture_maker=picture_maker) as world:
         world.set_weather(Weather(sun_azimuth=0.0, sun_elevation=35.0, cloud_cover=0.0))
-        pose = looking(20.0, -1.75, height + above, pitch)
+        pose = looking(20.0, -1.75, height + 20.0 * slope + above, pitch + tilt)
         before = world.radiance(pose, PINHOLE).luminance
-        world.add(crate, Placement(20.0 + distance, -1.75, height))
+        world.add(crate, Placement(20.0 + distance, -1.75, height + (20.0 + distance) * slope, 0.0, tilt))
         image = world.radiance(pose, PINHOLE)
     return int(((image.luminance < 0.5 * before).all(axis=-1) & (image.segmentation < 0)).sum())
 
@@ -148,3 +150,10 @@ def shadow_pixels(height: float, above: float = 1.6, pitch: float = 0.05, distan
 def test_shadow_at_any_height_is_that_on_level_road(height: float, view: tuple[float, float, float]) -> None:
     assert shadow_pixels(0.0, *view) > 20
     assert shadow_pixels(height, *view) == pytest.approx(shadow_pixels(0.0, *view), rel=0.1)
+
+
+@pytest.mark.parametrize(("pitch", "slope"), [(0.3, 0.0), (0.05, 0.15)], ids=["down", "uphill"])
+def test_distant_shadow_does_not_depend_on_pitch_and_slope(pitch: float, slope: float) -> None:
+    level = shadow_pixels(0.0, 4.0, 0.05, 30.0)
+    assert level > 30
+    assert shadow_pixels(0.0, 4.0, pitch, 30.0, slope) == pytest.approx(level, rel=0.2)
