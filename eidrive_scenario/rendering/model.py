@@ -126,7 +126,8 @@ def model(mesh: Mapping[str, Array], colors: Mapping[str, Color]) -> Model:
     corners = np.concatenate(list(mesh.values()))
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1)
-    kept = np.flatnonzero(length > 1e-12)  # triangles with an area
+    # Triangles with an area; those of a body of a few micrometers are small, too.
+    kept = np.flatnonzero(length > 1e-12 * min(1.0, float(np.ptp(corners.reshape(-1, 3), axis=0).max()) ** 2))
     material = material[kept]
     columns = _Columns(
         corners[kept].astype(np.float32),

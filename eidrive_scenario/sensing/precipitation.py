@@ -51,7 +51,8 @@ def drops_before(weather: Weather, pinhole: Pinhole, draws: np.random.Generator)
     farthest = max(pinhole.focal * usual * 1e-3 / FAINTEST, 2.0 * NEAREST)
     half_x, half_y = 0.55 * pinhole.width / pinhole.focal, 0.65 * pinhole.height / pinhole.focal
     volume = 4.0 * half_x * half_y * farthest**3 / 3.0
-    count = min(int(draws.poisson(per_cubic_meter * volume)), MAX_DROPS)
+    # The generator refuses the numbers of a field of view of almost 180 degrees.
+    count = min(int(draws.poisson(min(per_cubic_meter * volume, 1e9))), MAX_DROPS)
     depth = farthest * np.maximum(draws.random(count), (NEAREST / farthest) ** 3) ** (1.0 / 3.0)
     places = np.stack(
         [draws.uniform(-half_x, half_x, count) * depth, draws.uniform(-half_y, half_y, count) * depth, depth]

@@ -117,7 +117,7 @@ class CameraSettings(SensorSettings):
     kind: Literal["camera"] = "camera"
     width: int = Field(default=800, ge=2, le=8192)
     height: int = Field(default=600, ge=2, le=8192)
-    fov: float = Field(default=100.0, gt=0.0, lt=180.0)
+    fov: float = Field(default=100.0, ge=1e-3, lt=180.0)
     distortion: Annotated[tuple[float, float, float, float, float], BeforeValidator(_distortion, tuple[float, ...])] = (
         0.0,
     ) * 5

@@ -10,6 +10,7 @@ import pytest
 from eidrive_scenario.rendering.materials import MATERIALS, PAINTS, paint
 from eidrive_scenario.rendering.meshes import BUILDERS, actor_mesh, solids
 from eidrive_scenario.rendering.meshes.road_objects import building, road_object_mesh
+from eidrive_scenario.rendering.model import model
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.specs import SHAPES
 
@@ -80,6 +81,11 @@ def test_each_shape_fills_its_box(shape: str) -> None:
     assert high[0] - low[0] >= 0.85 * length
     assert sum(len(triangles) for triangles in mesh.values()) < 5000
     assert all(volume(triangles) >= -1e-6 for material, triangles in mesh.items() if material == "paint")
+
+
+def test_model_of_body_of_a_micrometer_fills_its_box() -> None:
+    mesh = actor_mesh(ActorSpec("A", "box", "misc", (1e-6, 1e-6, 1e-6), (0.0, 0.0, 5e-7)))
+    np.testing.assert_allclose(model(mesh, {"paint": (1.0, 1.0, 1.0)}).half, 5e-7, rtol=1e-4)
 
 
 def test_all_shapes_have_meshes_and_all_materials_colors() -> None:

@@ -25,7 +25,7 @@ from eidrive_scenario.sensing.camera import (
     lens_of,
     meter_exposure,
 )
-from eidrive_scenario.sensing.precipitation import drops_before
+from eidrive_scenario.sensing.precipitation import MAX_DROPS, drops_before
 from eidrive_scenario.sensing.settings import CameraSettings, NoiseSettings
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
@@ -212,6 +212,13 @@ def test_drops_follow_marshall_palmer_distribution() -> None:
     np.testing.assert_allclose(fall, -(9.65 - 10.3 * np.exp(-0.6 * diameters)))
 
 
+@pytest.mark.parametrize("kind", ["rain", "snow"])
+def test_drops_at_almost_180_degrees_are_at_most_the_maximum(kind: Any) -> None:
+    pinhole = lens_of(CameraSettings(fov=math.nextafter(180.0, 0.0)))
+    weather = Weather(precipitation=kind, precipitation_intensity=5.0)
+    assert len(drops_before(weather, pinhole, generator(1, "drops")).places) == MAX_DROPS
+
+
 def test_rain_changes_image_and_dry_weather_does_not() -> None:
     settings = CameraSettings(width=200, height=150, noise=None, lens_drops=False)
 
@@ -253,7 +260,15 @@ def test_noise_is_independent_of_other_cameras(boxes: Any) -> None:
 
 @pytest.mark.parametrize(
     "settings",
-    [{"width": 0}, {"height": -3}, {"fov": 180}, {"near": 2, "far": 1}, {"noise": {"read_noise": -1}}, {"gain": 100}],
+    [
+        {"width": 0},
+        {"height": -3},
+        {"fov": 180},
+        {"fov": 1e-4},
+        {"near": 2, "far": 1},
+        {"noise": {"read_noise": -1}},
+        {"gain": 100},
+    ],
 )
 def test_invalid_camera_settings_are_errors(settings: dict[str, Any]) -> None:
     with pytest.raises(ValidationError):
