@@ -164,7 +164,8 @@ class Lidar(Sensor):
             ten_percent_range=settings.ten_percent_range,
             draws=draws,
         )
-        kept = np.flatnonzero(back.detected & self._not_dropped(back.intensity, draws))
+        measured = back.detected & (back.distance <= settings.range)  # the air is measured up to 20 m
+        kept = np.flatnonzero(measured & self._not_dropped(back.intensity, draws))
         length = back.distance[kept]
         if settings.range_noise > 0.0:
             length = np.maximum(length + settings.range_noise * draws.standard_normal(len(kept)), 0.0)

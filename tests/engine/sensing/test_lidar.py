@@ -221,6 +221,13 @@ def test_air_without_measurable_scattering_returns_nothing(weather: Weather) -> 
     assert not back.detected.any()
 
 
+def test_air_is_measured_within_the_range(boxes: Any) -> None:
+    scene = boxes.scene(ego_and(boxes))
+    scene.weather = FOG
+    distance = np.linalg.norm(measure(boxes, scene, range=5.0, **EXACT).points, axis=1)
+    assert 4.5 < distance.max() <= 5.0
+
+
 def test_wet_road_has_lower_intensity(boxes: Any) -> None:
     scene = boxes.scene(ego_and(boxes), ground=True)
     rays = {"channels": 8, "upper_fov": -10, "points_per_second": 8 * 60 * 20, **EXACT}
