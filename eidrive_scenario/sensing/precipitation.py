@@ -18,7 +18,7 @@ STRENGTH = 6.0
 """Factor of streak intensity over the share of time in which a drop covers a pixel. A drop refracts the light of a wide
 field and is out of focus at short distance (Garg and Nayar, Vision and rain, 2007); neither is computed."""
 MAX_DROPS = 1400
-"""Maximum number of drops or flakes in one image; the nearest are drawn."""
+"""Maximum number of drops or flakes in one image; of more, a random share is drawn."""
 NEAREST, FAINTEST = 0.4, 0.22
 """Minimum distance of drops [m], and minimum width of a streak [px]; smaller ones are part of the attenuation of the
 air."""
