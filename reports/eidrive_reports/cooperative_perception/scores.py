@@ -152,6 +152,7 @@ class Precision:
     low, high  jackknife over the runs; NaN for a single one
     local      average precision of detections in the order of the frames, sorted within a frame only
     objects    number of true objects
+    left_out   average precision without each of the runs
     """
 
     value: float
@@ -159,6 +160,7 @@ class Precision:
     high: float
     local: float
     objects: int
+    left_out: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -216,7 +218,7 @@ class Pool:
             area_in_order(right[run != number], sum(objects) - count, scores[run != number])
             for number, count in enumerate(objects)
         ]
-        return Precision(value, *_limits(value, left_out), local, sum(objects))
+        return Precision(value, *_limits(value, left_out), local, sum(objects), tuple(left_out))
 
     def hidden_recall(self, overlap: int) -> HiddenRecall:
         """Return the recall of hidden objects at an overlap of OVERLAPS; NaN without such objects."""

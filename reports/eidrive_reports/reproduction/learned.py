@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from itertools import product
 from typing import Any
 
@@ -17,7 +18,7 @@ from eidrive_reports.cooperative_perception.receivers import (
     Study,
     on_axis,
 )
-from eidrive_reports.cooperative_perception.scores import OVERLAPS, RANGES, PerceptionRecord, Pool
+from eidrive_reports.cooperative_perception.scores import OVERLAPS, RANGES, PerceptionRecord, Pool, Precision
 from eidrive_reports.cooperative_perception.trial import FIRST_SAMPLE, SAMPLE_INTERVAL
 from eidrive_reports.reproduction.episodes import Episode
 from eidrive_reports.reproduction.layout import (
@@ -100,24 +101,24 @@ def gain_rows(measured: Sequence[PerceptionRecord]) -> Iterator[Row]:
     """Yield the gain of intermediate over late fusion in average precision, with jackknife intervals over the runs."""
     conditions = [(arm, NO_FAULT, 0.0) for arm in FEATURES]
     conditions += [(arm, axis, value) for axis in STUDY.axes for arm in INTERMEDIATE for value in AXES[axis][2][1:]]
-    without = [[*measured[:number], *measured[number + 1 :]] for number in range(len(measured))]
+    overlaps = list(enumerate(OVERLAPS))[1:]
+
+    @cache
+    def precisions(condition: Condition) -> list[Precision]:
+        pool = Pool(measured, condition.name, STUDY.reach)
+        return [pool.precision(index) for index, _ in overlaps]
+
     for late, (arm, fault, value) in product(LATE, conditions):
         compared = [Condition(name) if fault == NO_FAULT else on_axis(name, fault, value) for name in (arm, late)]
         fields: dict[str, Any] = {"arm": arm, "over": late, "fault": fault, "value": value}
-        for index, overlap in list(enumerate(OVERLAPS))[1:]:
-            gain, interval = _gain(measured, compared, index), None
+        for (_, overlap), first, second in zip(overlaps, *map(precisions, compared), strict=True):
+            gain, interval = first.value - second.value, None
             if len(measured) > 1:
-                interval = jackknife_interval(gain, [_gain(others, compared, index) for others in without])
+                without = [one - other for one, other in zip(first.left_out, second.left_out, strict=True)]
+                interval = jackknife_interval(gain, without)
             values = {"gain": gain, **bounds(interval)}
             fields |= {f"{name}_{round(100.0 * overlap)}": value for name, value in values.items()}
         yield fields
-
-
-def _gain(measured: Sequence[PerceptionRecord], compared: Sequence[Condition], overlap: int) -> float:
-    """Return the average precision of the first condition less that of the second."""
-    pools = (Pool(measured, condition.name, STUDY.reach) for condition in compared)
-    first, second = (pool.precision(overlap).value for pool in pools)
-    return first - second
 
 
 def _gain_column(title: str, prefix: str = "") -> Column:
