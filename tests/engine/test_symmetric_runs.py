@@ -139,10 +139,9 @@ def maximum_difference(found: np.ndarray, expected: np.ndarray) -> float:
     return float(difference.max(initial=0.0))
 
 
-@pytest.mark.parametrize("change", CHANGES)
-@pytest.mark.parametrize(
-    ("name", "fusion", "channel", "seed"),
-    [
+@pytest.fixture(
+    scope="module",
+    params=[
         ("coop/scenario_1", "average", "80211p_urban", 2),
         ("coop/scenario_1", "average", "latency_300ms", 3),
         ("coop/scenario_1", "covariance_intersection", "latency_300ms", 1),
@@ -150,21 +149,32 @@ def maximum_difference(found: np.ndarray, expected: np.ndarray) -> float:
         ("coop/scenario_2", "covariance_intersection", "cv2x_highway", 2),
         ("coop/scenario_2", "average", "none", 3),
     ],
+    ids=lambda values: "-".join(map(str, values)),
 )
+def original(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[tuple[str, str, str, int], RunTrace, RunResult]:
+    """Return name, fusion, channel and seed of a run in the world as it is, with its trace and result."""
+    name, fusion, channel, seed = request.param
+    path = write_scenario(tmp_path_factory.mktemp("world") / "original", name, fusion)
+    return request.param, *simulate(path, channel, seed)
+
+
+@pytest.mark.parametrize("change", CHANGES)
 def test_run_in_transformed_world_is_the_transformed_run(
-    tmp_path: Path, change: str, name: str, fusion: str, channel: str, seed: int
+    original: tuple[tuple[str, str, str, int], RunTrace, RunResult], tmp_path: Path, change: str
 ) -> None:
     roads, scenario, poses = CHANGES[change]
-    original, before = simulate(write_scenario(tmp_path / "original", name, fusion), channel, seed)
+    (name, fusion, channel, seed), expected, before = original
     other, after = simulate(write_scenario(tmp_path / "other", name, fusion, roads, scenario), channel, seed)
-    assert len(other.places) == len(original.places) > 100
+    assert len(other.places) == len(expected.places) > 100
     assert (after.passed, after.end_reason) == (before.passed, before.end_reason)
-    assert other.links == original.links
-    for tick, (there, here) in enumerate(zip(other.places, original.places, strict=True)):
+    assert other.links == expected.links
+    for tick, (there, here) in enumerate(zip(other.places, expected.places, strict=True)):
         assert maximum_difference(there, poses(here)) < ROUNDING, tick
-    for tick, (there, here) in enumerate(zip(other.known, original.known, strict=True)):
+    for tick, (there, here) in enumerate(zip(other.known, expected.known, strict=True)):
         assert there.shape == here.shape, tick
         assert maximum_difference(there, poses(here)) < ROUNDING, tick
     assert [loss for tick in other.losses for loss in tick] == pytest.approx(
-        [loss for tick in original.losses for loss in tick], abs=ROUNDING
+        [loss for tick in expected.losses for loss in tick], abs=ROUNDING
     )
