@@ -159,102 +159,81 @@ def play(plan: list[Act], stop: Any, fresh: Any) -> Iterator[tuple[Tree, list[St
 
 
 RANDOM = settings(
-    max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=100, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 
 
+def changes_are_legal_transitions(tree: Tree, changes: list[StateChange]) -> None:
+    for change in changes:
+        assert change.time == tree.context.time
+        if change.transition is not None:
+            assert (change.before, change.after) in LEGAL[change.transition]
+
+
+def children_are_active_only_in_running_parents(tree: Tree) -> None:
+    for element in tree.elements.values():
+        if element.state is not ElementState.RUNNING:
+            assert all(child.state is not ElementState.RUNNING for child in element.elements)
+        if element.state is ElementState.COMPLETE:
+            assert all(child.state is not ElementState.STANDBY for child in element.elements)
+
+
+def elements_end_when_all_children_are_complete(
+    tree: Tree, change: StateChange, states: dict[str, ElementState]
+) -> None:
+    if change.transition is ElementTransition.END:
+        children = tree.elements[change.element].elements
+        assert all(states.get(child.name) is ElementState.COMPLETE for child in children)
+
+
+def executions_do_not_exceed_the_execution_count(tree: Tree) -> None:
+    assert all(element.executions <= element.limit for element in tree.elements.values())
+
+
+def priorities_apply_to_the_events_of_a_maneuver(
+    tree: Tree, change: StateChange, states: dict[str, ElementState]
+) -> None:
+    event = tree.elements[change.element]
+    if isinstance(event, EventElement):
+        rivals = [states.get(rival) is ElementState.RUNNING for rival in tree.rivals[event.name]]
+        if change.transition is ElementTransition.START and event.priority != "parallel":
+            assert not any(rivals)
+        if change.transition is ElementTransition.SKIP:
+            assert event.priority == "skip"
+            assert any(rivals)
+
+
+def one_action_controls_a_domain_of_an_actor(tree: Tree) -> None:
+    held: list[tuple[str | None, Domain]] = []
+    for element in tree.elements.values():
+        if isinstance(element, ActionElement) and element.state is ElementState.RUNNING:
+            held += [(one.actor_name, domain) for one in element.running for domain in one.controls]
+    assert len(held) == len(set(held))
+
+
+def running_actions_have_running_behaviours(tree: Tree) -> None:
+    for element in tree.elements.values():
+        if isinstance(element, ActionElement):
+            assert (element.state is ElementState.RUNNING) == bool(element.running)
+
+
 @RANDOM
 @given(plan=ACTS, stop=TRIGGERS)
-def test_every_change_is_a_legal_transition(plan: Any, stop: Any, fresh: Any) -> None:
-    for tree, changes in play(plan, stop, fresh):
-        for change in changes:
-            assert change.time == tree.context.time
-            if change.transition is not None:
-                assert (change.before, change.after) in LEGAL[change.transition]
-
-
-@pytest.mark.exhaustive
-@RANDOM
-@given(plan=ACTS, stop=TRIGGERS)
-def test_children_are_active_only_in_running_parents(plan: Any, stop: Any, fresh: Any) -> None:
-    for tree, _ in play(plan, stop, fresh):
-        for element in tree.elements.values():
-            if element.state is not ElementState.RUNNING:
-                assert all(child.state is not ElementState.RUNNING for child in element.elements)
-            if element.state is ElementState.COMPLETE:
-                assert all(child.state is not ElementState.STANDBY for child in element.elements)
-
-
-@RANDOM
-@given(plan=ACTS, stop=TRIGGERS)
-def test_element_ends_when_all_children_are_complete(plan: Any, stop: Any, fresh: Any) -> None:
+def test_invariants_hold_at_every_tick_of_random_storyboards(plan: Any, stop: Any, fresh: Any) -> None:
     states: dict[str, ElementState] = {}
-    for tree, changes in play(plan, stop, fresh):
-        for change in changes:
-            if change.transition is ElementTransition.END:
-                children = tree.elements[change.element].elements
-                assert all(states.get(child.name) is ElementState.COMPLETE for child in children)
-            states[change.element] = change.after
-
-
-@RANDOM
-@given(plan=ACTS, stop=TRIGGERS)
-def test_executions_do_not_exceed_the_execution_count(plan: Any, stop: Any, fresh: Any) -> None:
-    for tree, _ in play(plan, stop, fresh):
-        assert all(element.executions <= element.limit for element in tree.elements.values())
-
-
-@RANDOM
-@given(plan=ACTS, stop=TRIGGERS)
-def test_priorities_apply_to_the_events_of_a_maneuver(plan: Any, stop: Any, fresh: Any) -> None:
-    states: dict[str, ElementState] = {}
-    for tree, changes in play(plan, stop, fresh):
-        for change in changes:
-            event = tree.elements[change.element]
-            if isinstance(event, EventElement):
-                rivals = [states.get(rival) is ElementState.RUNNING for rival in tree.rivals[event.name]]
-                if change.transition is ElementTransition.START and event.priority != "parallel":
-                    assert not any(rivals)
-                if change.transition is ElementTransition.SKIP:
-                    assert event.priority == "skip"
-                    assert any(rivals)
-            states[change.element] = change.after
-
-
-@RANDOM
-@given(plan=ACTS, stop=TRIGGERS)
-def test_one_action_controls_a_domain_of_an_actor(plan: Any, stop: Any, fresh: Any) -> None:
-    for tree, _ in play(plan, stop, fresh):
-        held: list[tuple[str | None, Domain]] = []
-        for element in tree.elements.values():
-            if isinstance(element, ActionElement) and element.state is ElementState.RUNNING:
-                held += [(one.actor_name, domain) for one in element.running for domain in one.controls]
-        assert len(held) == len(set(held))
-
-
-@pytest.mark.exhaustive
-@RANDOM
-@given(plan=ACTS, stop=TRIGGERS)
-def test_running_action_has_running_behaviours(plan: Any, stop: Any, fresh: Any) -> None:
-    for tree, _ in play(plan, stop, fresh):
-        for element in tree.elements.values():
-            if isinstance(element, ActionElement):
-                assert (element.state is ElementState.RUNNING) == bool(element.running)
-
-
-@RANDOM
-@given(plan=ACTS, stop=TRIGGERS)
-def test_conditions_are_evaluated_at_most_once_per_tick(plan: Any, stop: Any, fresh: Any) -> None:
-    for number, (tree, _) in enumerate(play(plan, stop, fresh), start=1):
-        assert all(script.asked <= number for script in tree.scripts)
-
-
-@RANDOM
-@given(plan=ACTS, stop=TRIGGERS)
-def test_stopped_storyboard_does_not_change(plan: Any, stop: Any, fresh: Any) -> None:
     over = False
-    for tree, changes in play(plan, stop, fresh):
-        assert not (over and changes)
+    for number, (tree, changes) in enumerate(play(plan, stop, fresh), start=1):
+        changes_are_legal_transitions(tree, changes)
+        children_are_active_only_in_running_parents(tree)
+        executions_do_not_exceed_the_execution_count(tree)
+        one_action_controls_a_domain_of_an_actor(tree)
+        running_actions_have_running_behaviours(tree)
+        for change in changes:
+            elements_end_when_all_children_are_complete(tree, change, states)
+            priorities_apply_to_the_events_of_a_maneuver(tree, change, states)
+            states[change.element] = change.after
+        assert all(script.asked <= number for script in tree.scripts), "conditions are evaluated at most once per tick"
+        assert not (over and changes), "a stopped storyboard does not change"
         over = over or tree.root.state is ElementState.COMPLETE
 
 
