@@ -95,11 +95,11 @@ def test_uninterruptible_run_of_worker_does_not_affect_other_runs(project: pytes
 @pytest.mark.process
 def test_wall_limit_option_overrides_ini_option(project: pytest.Pytester) -> None:
     project.makeini("[pytest]\neidrive_wall_limit = never\neidrive_without_criteria = pass\n")
-    refused = project.runpytest_subprocess("xosc/sound_0.xosc", "-p", "no:cacheprovider")
+    refused = project.runpytest("xosc/sound_0.xosc", "-p", "no:cacheprovider")
     refused.stderr.fnmatch_lines(
         ["*ini option eidrive_wall_limit: not a positive number of seconds or none (got 'never')*"]
     )
-    sound = project.runpytest_subprocess("xosc/sound_0.xosc", "--eidrive-wall-limit", "none", "-p", "no:cacheprovider")
+    sound = project.runpytest("xosc/sound_0.xosc", "--eidrive-wall-limit", "none", "-p", "no:cacheprovider")
     sound.assert_outcomes(passed=1)
 
 
