@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 
 from eidrive_scenario.base.arrays import Array, Integers
 from eidrive_scenario.v2x.counter_random import Keys, combine_keys, key, uniforms
@@ -74,6 +73,8 @@ class LinkBudget:
 
     def at(self, surroundings: RadioEnvironment) -> Budget:
         """Return the link budget at the current antenna positions."""
+        from scipy.special import ndtr
+
         names = surroundings.names
         if names != self._names:
             self._set_stations(names)
@@ -157,6 +158,8 @@ class LinkBudget:
         x <- k x + sqrt(1 - k²) n with k = e^(-s / d) and a standard normal number n keeps the variance of 1. A pair at
         rest has k = 1 and keeps its numbers; a new pair has covered an infinite distance, so k = 0.
         """
+        from scipy.special import ndtri
+
         step = positions - self._positions
         moved = np.sqrt(np.einsum("ni,ni->n", step, step))
         covered = moved.take(self._first) + moved.take(self._second)

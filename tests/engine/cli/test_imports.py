@@ -43,6 +43,7 @@ print("imported:", *sys.modules)
         (["--version"], (*SHORT, *OTHER_COMMANDS, "ctypes", "email", "lxml", "pydantic")),
         (["list"], (*SHORT, *OTHER_COMMANDS)),
         (["list", "detectors"], (*SHORT, *OTHER_COMMANDS)),
+        (["list", "criteria"], (*HEAVY, *OTHER_COMMANDS)),
         (["run", "coop/scenario_1"], (*HEAVY, *OTHER_COMMANDS, *UNUSED)),
         (
             ["sweep", "coop/scenario_1", "--vary", "EgoSpeed=6:8:1", "--store", "unused.db", "--dry-run"],
