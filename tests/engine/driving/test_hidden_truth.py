@@ -127,18 +127,19 @@ def check_hidden_actors(name: str, channel: str, tmp_path: Path, **parameters: s
     path = library_path() / f"{name}.xosc"
     tree: Any = etree.parse(path)
     actors = [element.get("name") for element in tree.iterfind(".//Entities/ScenarioObject")]
-    original: list[Decision] = []
-    for decision in decisions(path, channel, **parameters):
-        original.append(decision)
-        if len(original) > START and {EGO, *decision.known}.issuperset(actors):
-            break  # Nothing is hidden from here on.
+    unchanged = decisions(path, channel, **parameters)
+    original = list(islice(unchanged, START + 1))
     hidden = [actor for actor in actors if len(original) > START and actor not in original[START].known]
     hidden = [actor for actor in hidden if actor != EGO]
     for actor in hidden:
         other = moved(path, actor, tmp_path / actor)
         if other is None:
             continue
-        for step, (before, after) in enumerate(zip(original, decisions(other, channel, **parameters), strict=False)):
+        for step, after in enumerate(decisions(other, channel, **parameters)):
+            original += islice(unchanged, max(0, step + 1 - len(original)))
+            if step == len(original):
+                break
+            before = original[step]
             if actor in before.known or actor in after.known or _others_react(before, after, actor):
                 break
             assert before[:3] == after[:3], f"{actor} at step {step}"

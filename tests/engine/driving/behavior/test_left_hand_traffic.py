@@ -58,6 +58,9 @@ def test_drive_on_the_left_is_the_mirrored_drive(tmp_path: Path, scene: str, man
     with_traffic_on_the_right = run_file(source, seed=1, observers=[right])
     with_traffic_on_the_left = run_file(write_mirrored(source, tmp_path), seed=1, observers=[left])
     assert with_traffic_on_the_right.passed is with_traffic_on_the_left.passed is True
+    assert {verdict.name for verdict in with_traffic_on_the_right.criteria} >= {"collision", "reach_position"}
+    assert with_traffic_on_the_right.metrics["collision.count"] == 0.0
+    assert not with_traffic_on_the_right.warnings
     assert len(left.poses) == len(right.poses) > 100
     difference = np.array(left.poses) - np.array(right.poses) * [1.0, -1.0, -1.0]
     difference[..., 2] = wrap_angle(difference[..., 2])
