@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from eidrive_scenario.base.content_digest import canonical_json
 from eidrive_scenario.errors import Diagnostic, InputError, SettingError, suggestion
 from eidrive_scenario.pytest_plugin.failures import WARNING, add_properties, record_of
 from eidrive_scenario.pytest_plugin.option_values import path_beside, split_channels
@@ -31,12 +30,12 @@ from eidrive_scenario.run_options import (
     option_of,
     with_option_names,
 )
-from eidrive_scenario.simulation.resolved_settings import ResolvedSettings
 
 if TYPE_CHECKING:
     from eidrive_scenario.experiments.success_rate import RateVerdict
     from eidrive_scenario.openscenario import ConcreteRun, Source
     from eidrive_scenario.simulation import RunResult
+    from eidrive_scenario.simulation.resolved_settings import ResolvedSettings
 
 Properties = list[tuple[str, object]]
 
@@ -252,6 +251,8 @@ def properties(result: RunResult) -> Properties:
 
 def setting_properties(settings: ResolvedSettings) -> Properties:
     """Return one property for each resolved setting, as text, number or JSON, and the hash of all settings."""
+    from eidrive_scenario.base.content_digest import canonical_json
+
     entries: Properties = []
     for name, value in settings.as_json().items():
         plain = isinstance(value, str | int | float) and not isinstance(value, bool)

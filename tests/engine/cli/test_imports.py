@@ -60,6 +60,14 @@ def test_command_imports_no_module_without_need(arguments: list[str], excluded: 
     assert not set(imported) & set(excluded)
 
 
+@pytest.mark.process
+def test_plugin_of_pytest_imports_no_engine_before_the_first_run() -> None:
+    """pytest loads the plugin in every project of its environment."""
+    program = "import sys, eidrive_scenario.pytest_plugin; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert not set(done.stdout.split()) & {*SHORT, "pydantic", "typer", "eidrive_scenario.simulation"}
+
+
 def test_version_of_the_engine_is_that_of_its_distribution() -> None:
     assert __version__ == version("eidrive-scenario")
 
