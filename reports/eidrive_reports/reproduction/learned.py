@@ -114,7 +114,7 @@ def gain_rows(measured: Sequence[PerceptionRecord]) -> Iterator[Row]:
         for (_, overlap), first, second in zip(overlaps, *map(precisions, compared), strict=True):
             gain, interval = first.value - second.value, None
             if len(measured) > 1:
-                without = [one - other for one, other in zip(first.left_out, second.left_out, strict=True)]
+                without = [a - b for a, b in zip(first.left_out, second.left_out, strict=True)]
                 interval = jackknife_interval(gain, without)
             values = {"gain": gain, **bounds(interval)}
             fields |= {f"{name}_{round(100.0 * overlap)}": value for name, value in values.items()}

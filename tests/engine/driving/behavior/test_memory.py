@@ -47,10 +47,10 @@ def test_readings_that_several_decisions_get_are_one_observation(rate: int) -> N
         read = math.floor(now * rate + 1e-6) / rate
         braking = max(read - 2.0, 0.0)
         box = KnownBox(8.0 * read - braking**2, vx=math.nan, vy=math.nan)
-        (known,) = objects.update(detections(now, box), now)
+        (car,) = objects.update(detections(now, box), now)
         if 1.0 < now < 2.0:
-            assert (known.x, known.vx) == pytest.approx((8.0 * now, 8.0), abs=1e-6)
-    assert known.acceleration == pytest.approx(-2.0, rel=0.1)
+            assert (car.x, car.vx) == pytest.approx((8.0 * now, 8.0), abs=1e-6)
+    assert car.acceleration == pytest.approx(-2.0, rel=0.1)
 
 
 def test_measured_velocity_is_taken_as_it_is() -> None:
