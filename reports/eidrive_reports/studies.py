@@ -16,13 +16,9 @@ T = TypeVar("T")
 
 def markdown_table(titles: Sequence[str], lines: Iterable[Iterable[object]]) -> str:
     """Return a table as Markdown, with the text of each cell."""
-    header, *rest = ["|".join(["", *map(_cell, cells), "\n"]) for cells in (titles, *lines)]
+    escaped = ([str(cell).replace("|", "\\|") for cell in cells] for cells in (titles, *lines))
+    header, *rest = [f"| {' | '.join(cells)} |\n" for cells in escaped]
     return "".join([header, "|---" * len(titles) + "|\n", *rest])
-
-
-def _cell(content: object) -> str:
-    text = str(content).replace("|", "\\|")
-    return f" {text} " if text else " "
 
 
 def group_by(runs: Iterable[T], key: Callable[[T], Any]) -> dict[Any, list[T]]:

@@ -70,7 +70,7 @@ def test_table_counts_collisions_of_the_stack_only() -> None:
     assert table(runs, has_reference=True).splitlines()[2:] == [
         "| a.xosc | 2 | 2 | 2 | 1 | 150 | 8.0 | - |",
         "| b.xosc | 1 | 0 | 0 | 0 | 0 | 0.0 | `keep_lane` |",
-        "| c.xosc | 2 | c.xosc:3: a\\|b | | | | | |",
+        "| c.xosc | 2 | c.xosc:3: a\\|b |  |  |  |  |  |",
         "| c.xosc | 1 | 0 | 0 | 0 | 50 | 0.0 | - |",
     ]
 
