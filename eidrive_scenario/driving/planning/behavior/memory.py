@@ -158,13 +158,13 @@ class KnownObject(msgspec.Struct):
         step    time since the last decision [s]
         shares  weights of a new observation after this time
         """
-        if fresh.measured is not None:
-            if fresh.measured == self.measured and fresh.seen - self.measured_at < REPEATED - TIME_TOLERANCE:
+        if not fresh.has_velocity:
+            elapsed = fresh.seen - self.measured_at
+            if fresh.measured == self.measured and elapsed < REPEATED - TIME_TOLERANCE:
                 self.row, self.seen, self.hidden_since = fresh.row, fresh.seen, None
                 return
-            if step > 0.0 and fresh.seen - self.measured_at > step:
-                step = fresh.seen - self.measured_at
-                shares = _Shares.of(step)
+            if elapsed > step > 0.0:
+                step, shares = elapsed, _Shares.of(elapsed)
         before = self.speed if self.has_velocity else None
         if fresh.has_velocity:
             self.vx, self.vy = fresh.vx, fresh.vy
