@@ -92,7 +92,6 @@ def test_uninterruptible_run_of_worker_does_not_affect_other_runs(project: pytes
     assert not any(cases[name] for name in SOUND[:3])
 
 
-@pytest.mark.process
 def test_wall_limit_option_overrides_ini_option(project: pytest.Pytester) -> None:
     project.makeini("[pytest]\neidrive_wall_limit = never\neidrive_without_criteria = pass\n")
     refused = project.runpytest("xosc/sound_0.xosc", "-p", "no:cacheprovider")

@@ -21,6 +21,16 @@ LATERAL = {
     "Orientation": ("h",),
 }
 """Attributes of a scenario with a direction to the left or a lane number."""
+SCENES = {
+    "parked_car_with_room": "pass car on the left",
+    "parked_car_without_room": "pass truck on the left",
+    "oncoming_overtaker": None,
+    "slow_truck": "change lane to the left",
+    "merging": None,
+    "left_turn": None,
+    "roundabout": None,
+}
+"""Scenes `driving/*` that are driven on both sides, with a maneuver of the ego."""
 NUMBER = r"[-+]?[\d.]+"
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mirrored_scenario import write_mirrored
+from mirrored_scenario import SCENES, write_mirrored
 
 from eidrive_scenario.api.run import run_file
 from eidrive_scenario.base.geometry import wrap_angle
@@ -17,7 +17,7 @@ from eidrive_scenario.recording.frame import Frame
 
 pytestmark = pytest.mark.exhaustive
 
-LIBRARY = Path(__file__).parents[4] / "xosc"
+FOLDER = Path(__file__).parents[4] / "xosc" / "driving"
 ROUNDING = 1e-9
 """Tolerance of positions [m] and headings [rad]."""
 
@@ -40,20 +40,9 @@ class Drive:
         """Do nothing."""
 
 
-@pytest.mark.parametrize(
-    ("scene", "maneuver"),
-    [
-        ("driving/parked_car_with_room", "pass car on the left"),
-        ("driving/parked_car_without_room", "pass truck on the left"),
-        ("driving/oncoming_overtaker", None),
-        ("driving/slow_truck", "change lane to the left"),
-        ("driving/merging", None),
-        ("driving/left_turn", None),
-        ("driving/roundabout", None),
-    ],
-)
+@pytest.mark.parametrize(("scene", "maneuver"), SCENES.items())
 def test_drive_on_the_left_is_the_mirrored_drive(tmp_path: Path, scene: str, maneuver: str | None) -> None:
-    source = LIBRARY / f"{scene}.xosc"
+    source = FOLDER / f"{scene}.xosc"
     right, left = Drive(), Drive()
     with_traffic_on_the_right = run_file(source, seed=1, observers=[right])
     with_traffic_on_the_left = run_file(write_mirrored(source, tmp_path), seed=1, observers=[left])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mirrored_scenario
 import pytest
 from corpora import corpora_folder
 from lxml import etree
@@ -12,11 +13,6 @@ from eidrive_scenario.api.run import RunSettings, check_scenario, run_file
 
 FOLDER = Path(__file__).parents[4] / "xosc" / "driving"
 SCENES = sorted(path.stem for path in FOLDER.glob("*.xosc"))
-MIRRORED = {
-    "left_turn", "merging", "oncoming_overtaker", "parked_car_with_room", "parked_car_without_room", "roundabout",
-    "slow_truck",
-}  # fmt: skip
-"""Scenes that test_left_hand_traffic drives and judges."""
 
 
 def test_library_has_the_scenes() -> None:
@@ -24,8 +20,9 @@ def test_library_has_the_scenes() -> None:
 
 
 @pytest.mark.exhaustive
-@pytest.mark.parametrize("scene", [scene for scene in SCENES if scene not in MIRRORED])
+@pytest.mark.parametrize("scene", sorted({*SCENES} - {*mirrored_scenario.SCENES}))
 def test_behavior_arrives_without_collision_by_own_fault(scene: str) -> None:
+    """Other scenes are driven and judged with traffic on both sides, by test_left_hand_traffic."""
     result = run_file(f"driving/{scene}", seed=1)
     assert {verdict.name for verdict in result.criteria} >= {"collision", "reach_position"}
     assert all(verdict.passed for verdict in result.criteria)
