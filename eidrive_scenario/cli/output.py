@@ -59,13 +59,17 @@ def _with_option_names(text: str) -> str:
 
 
 def flush_output() -> None:
-    """Write the buffered output. If that fails it is discarded, so that the flush at exit does not fail again: raise
-    OSError."""
-    try:
-        sys.stdout.flush()
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        raise
+    """Write the buffered output and errors. What fails is discarded, so that the flush at exit does not fail again:
+    raise OSError."""
+    failures = []
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError as error:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+            failures.append(error)
+    if failures:
+        raise failures[0]
 
 
 def _writable(stream: TextIO | None) -> TextIO:

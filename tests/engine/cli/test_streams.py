@@ -144,11 +144,13 @@ def test_full_disk_is_reported_in_one_line(passing_by: Path, arguments: list[str
 
 @pytest.mark.process
 @pytest.mark.skipif(not FULL.exists(), reason="this system has no /dev/full")
-def test_full_standard_error_is_no_failed_criterion() -> None:
-    """An exception without a handler would end with the exit code 1."""
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_full_standard_error_is_no_failed_criterion(unbuffered: str) -> None:
+    """An exception without a handler would end with the exit code 1, and buffered errors with 120."""
     with FULL.open("wb") as full:
         command = [sys.executable, "-m", "eidrive_scenario", "judge", "missing"]
-        assert subprocess.run(command, stderr=full, check=False).returncode == 3
+        given = os.environ | {"PYTHONUNBUFFERED": unbuffered}
+        assert subprocess.run(command, stderr=full, env=given, check=False).returncode == 3
 
 
 @pytest.mark.process
