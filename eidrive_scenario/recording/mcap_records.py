@@ -149,7 +149,7 @@ class McapFile:
         self._damage.add(f"the file has more than {MAX_RECORDS} records")
 
     def record_at(self, offset: int) -> Record:
-        """Return the record that `records` found at this offset."""
+        """Return the record that `records` found at this offset. Raise struct.error if the file ends before it."""
         opcode, length = _HEAD.unpack(self.read(offset, _HEAD.size))
         return Record(opcode, offset, self.read(offset + _HEAD.size, min(length, LARGEST_RECORD)))
 

@@ -69,14 +69,15 @@ class Recording:
         """Yield the frames in order, bit for bit equal to the recorded ones if the recording is undamaged.
 
         Unreadable frames of a damaged recording are skipped, and `skipped` is called with the reason for each.
-        Raise InputError if this version cannot read a frame of an undamaged recording.
+        Raise InputError if this version cannot read a frame of an undamaged recording, or if the file has changed since
+        it was opened.
         """
         decode = JsonText(Frame).decode
         last = -1
         damage = DamageReport()
         with mcap.McapFile(self.path, damage) as file:
             for offset in self._blocks:
-                for message in _messages(file, file.record_at(offset), damage):
+                for message in self._messages_again(file, offset, damage):
                     if message.sequence <= last:
                         continue  # duplicate
                     try:
@@ -86,6 +87,16 @@ class Recording:
                         continue
                     last = message.sequence
                     yield frame
+
+    def _messages_again(self, file: mcap.McapFile, offset: int, damage: DamageReport) -> list[mcap.Message]:
+        """Return the frames of a record that had some when the file was opened. Raise InputError if it has changed."""
+        try:
+            messages = _messages(file, file.record_at(offset), damage)
+        except (struct.error, mcap.ContentLimitError):
+            messages = []
+        if not messages or (damage and not self.damage):
+            raise InputError(Diagnostic("the file has changed since it was opened", "open it again", str(self.path)))
+        return messages
 
     def _skip(self, tick: int, error: ValueError, skipped: Callable[[str], None] | None) -> None:
         reason = f"frame {tick} cannot be decoded: {error}"

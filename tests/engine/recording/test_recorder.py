@@ -1,6 +1,7 @@
 """Recordings: lossless round trip, and reading of truncated files."""
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -152,6 +153,15 @@ def test_truncated_recording_returns_its_first_frames(tmp_path: Path, make_frame
     assert ticks == list(range(len(ticks)))
     assert len(ticks) < 600
     assert share < 0.9 or ticks
+
+
+@pytest.mark.parametrize("share", [0.0005, 0.2, 0.5])
+def test_recording_truncated_after_its_opening_is_an_error(tmp_path: Path, make_frame: MakeFrame, share: float) -> None:
+    path = record(tmp_path / "run.mcap", [make_frame(tick) for tick in range(600)])
+    recording = read_recording(path)
+    os.truncate(path, int(share * path.stat().st_size))
+    with pytest.raises(InputError, match=r"run\.mcap: the file has changed since it was opened"):
+        list(recording.frames())
 
 
 @pytest.mark.parametrize("kind", RECORDERS)
