@@ -111,7 +111,7 @@ def _space(action: ActionSettings) -> spaces.Space[Any]:
 def _numbers(given: Any, count: int) -> list[float]:
     """Return numbers in [-1, 1]."""
     expected = f"{counted(count, 'number')} from -1 to 1"
-    values = _array(given, expected, float).reshape(-1).tolist()
+    values = _array(given, expected, "iufb").reshape(-1).tolist()
     if len(values) != count or not all(abs(value) <= 1.0 + _TOLERANCE for value in values):
         raise _outside(given, expected)
     return [min(max(value, -1.0), 1.0) for value in values]
@@ -120,8 +120,8 @@ def _numbers(given: Any, count: int) -> list[float]:
 def _index(given: Any, count: int) -> int:
     """Return an integer from 0 to `count` - 1."""
     expected = f"an integer from 0 to {count - 1}"
-    value = _array(given, expected)
-    if value.size != 1 or value.dtype.kind not in "iu" or not 0 <= int(value.item()) < count:
+    value = _array(given, expected, "iu")
+    if value.size != 1 or not 0 <= int(value.item()) < count:
         raise _outside(given, expected)
     return int(value.item())
 
@@ -129,18 +129,21 @@ def _index(given: Any, count: int) -> int:
 def _mask(given: Any, count: int) -> Bools:
     """Return `count` truth values."""
     expected = f"{counted(count, 'number')} out of 0 and 1"
-    value = _array(given, expected)
+    value = _array(given, expected, "iufb")
     if value.shape != (count,) or not np.isin(value, (0, 1)).all():
         raise _outside(given, expected)
     return value.astype(bool)
 
 
-def _array(given: Any, expected: str, dtype: type[float] | None = None) -> NDArray[Any]:
-    """Return an action as an array. Raise SettingError if it has no such form."""
+def _array(given: Any, expected: str, kinds: str) -> NDArray[Any]:
+    """Return an action as an array of one of the kinds of numpy. Raise SettingError if it has no such form."""
     try:
-        return np.asarray(given, dtype)
+        values = np.asarray(given)
     except (OverflowError, TypeError, ValueError):
         raise _outside(given, expected) from None
+    if values.dtype.kind not in kinds:
+        raise _outside(given, expected)
+    return values
 
 
 def _outside(given: Any, expected: str) -> SettingError:

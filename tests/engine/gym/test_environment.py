@@ -195,6 +195,7 @@ def test_scenario_without_station_is_an_error() -> None:
     [
         ("target_speed", [1.5], "give 1 number from -1 to 1"),
         ("target_speed", [float("nan")], "give 1 number from -1 to 1"),
+        ("target_speed", ["0.5"], "give 1 number from -1 to 1"),
         ("pedals", [0.0], "give 2 numbers from -1 to 1"),
         ("meta_speed", 3, "give an integer from 0 to 2"),
         ("meta_speed", 0.5, "give an integer from 0 to 2"),
