@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 from eidrive_scenario.driving.step import StationAction, StationPerception
 from eidrive_scenario.errors import Diagnostic, SettingError, SimulationError, quoted, suggestion
 from eidrive_scenario.evaluation.criteria_parser import EXITS
-from eidrive_scenario.gym.episode import Episode
+from eidrive_scenario.gym.episode import Decide, Episode, Transition
 from eidrive_scenario.gym.libraries import gymnasium
 from eidrive_scenario.gym.settings import (
     METADATA,
@@ -194,8 +194,11 @@ class ScenarioEnvironment:
             for interface in self._interfaces.values():
                 interface.rewards.check_criteria(criteria)
             episode.begin()
+            for interface in self._interfaces.values():
+                interface.encoder.reset()
+                interface.receive(episode)
             while episode.result is None and not self._present(episode):
-                episode.advance(lambda perceived: {})
+                self._advance(episode, lambda perceived: {})
             if self._duration is not None and episode.result is None:
                 episode.limit_time(self._duration)
         except BaseException:
@@ -240,15 +243,22 @@ class ScenarioEnvironment:
         for _ in range(self._ticks_per_step):
             live = [name for name in acting if name in episode.perceived and name not in self._left]
             routes = {name: self._interfaces[name].route(episode.perceived[name]) for name in live}
-            transition = episode.advance(decide)
+            transition = self._advance(episode, decide)
             for name in live:
                 terms[name].append(self._interfaces[name].reward_terms(transition, routes[name], episode))
             self._left.update(name for name in acting if name not in episode.perceived)
             if episode.result is not None:
                 break
         while episode.result is None and not self._present(episode):
-            episode.advance(lambda perceived: {})
+            self._advance(episode, lambda perceived: {})
         return self._outcome(episode, acting, terms)
+
+    def _advance(self, episode: Episode, decide: Decide) -> Transition:
+        """Execute one tick; stations that enter within a step receive the messages of its later ticks, too."""
+        transition = episode.advance(decide)
+        for interface in self._interfaces.values():
+            interface.receive(episode)
+        return transition
 
     def _check_agents(self, actions: Mapping[str, Any]) -> None:
         """Raise SettingError unless the actions are those of the agents."""

@@ -217,7 +217,7 @@ class ObservationEncoder:
         return self.settings.route is not None or self.settings.grid is not None
 
     def reset(self) -> None:
-        """Begin an episode."""
+        """Forget all received messages."""
         self._newest = {}
 
     def receive(self, perceived: StationPerception) -> None:

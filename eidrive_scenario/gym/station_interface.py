@@ -80,7 +80,6 @@ class StationInterface:
 
     def begin(self, episode: Episode) -> None:
         """Begin an episode in which the station is present."""
-        self.encoder.reset()
         simulation, perceived = episode.simulation, episode.perceived[self.name]
         spec = actor_spec(self.name, simulation.scenario.entities[self.name])
         self._control, self._planner, self._route = None, None, (-1.0, None)
@@ -91,7 +90,14 @@ class StationInterface:
         requested = None if perceived.goal is None else perceived.goal.speed
         speed = perceived.ego.speed if requested is None else requested
         self.decoder.reset(speed, spec.max_steering)
-        self.encoder.receive(perceived)
+
+    def receive(self, episode: Episode) -> None:
+        """Register the messages that the station receives in the current tick; forget all while it is not present."""
+        perceived = episode.perceived.get(self.name)
+        if perceived is None:
+            self.encoder.reset()
+        else:
+            self.encoder.receive(perceived)
 
     def observe(self, episode: Episode) -> Any:
         """Return the observation; zeros if the station is not present."""
@@ -101,16 +107,13 @@ class StationInterface:
         return self.encoder.encode(perceived, self.route(perceived), self._control)
 
     def reward_terms(self, transition: Transition, route: PathPart | None, episode: Episode) -> dict[str, float]:
-        """Return the terms of the reward of one tick, and register its control and messages.
+        """Return the terms of the reward of one tick, and register its control.
 
         route  the one before the tick
         """
         step = transition.steps.get(self.name)
         if step is not None:
             self._control = step.control
-        perceived = episode.perceived.get(self.name)
-        if perceived is not None and transition.after is not transition.before:
-            self.encoder.receive(perceived)
         attached = episode.simulation.world.attached(self.name)
         return self.rewards.terms_of_tick(transition.before, transition.after, step, route, attached)
 

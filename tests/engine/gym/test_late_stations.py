@@ -24,6 +24,7 @@ from storyboard_xml import (
 
 from eidrive_scenario.errors import SettingError
 from eidrive_scenario.gym import EidriveEnv, EidriveParallelEnv
+from eidrive_scenario.simulation import RunSettings
 
 ADDED, DELETED, RETURNED = 1.0, 2.0, 2.5
 """Times of the actions on Ego [s]; it is in the views of the following time steps."""
@@ -107,6 +108,27 @@ def two_stations() -> bytes:
     parts = visits().replace(b"</Entities>", other.encode() + b"</Entities>")
     start = init_xml("Other", teleport_xml(lane_position_xml(-1, 60.0))).encode()
     return parts.replace(b"<Actions></Actions>", b"<Actions>" + start + b"</Actions>")
+
+
+def test_entry_within_a_step_keeps_messages_of_all_its_ticks() -> None:
+    """Other sends twice per second; an environment with one tick per step registers each message."""
+    station = b'<Property name="detector" value="oracle"/><Property name="message_rate" value="2"/></Properties>'
+    ages: dict[int, dict[float, list[list[float]]]] = {1: {}, 16: {}}
+    for ticks, of_time in ages.items():
+        env = EidriveParallelEnv(
+            two_stations().replace(b"</Properties>", station),
+            observation={"senders": True},
+            settings=RunSettings(channel="ideal"),
+            ticks_per_step=ticks,
+        )
+        env.reset(seed=1)
+        for _ in range(32 // ticks):
+            observations, *_, infos = env.step({name: [-1.0] for name in env.agents})
+            if "Ego" in observations:
+                of_time[infos["Ego"]["time"]] = observations["Ego"]["senders"].tolist()
+        env.close()
+    ((time, seen),) = ages[16].items()
+    assert (seen, seen[0][0]) == (ages[1][time], 1.0)
 
 
 def test_checks_of_pettingzoo_accept_departure_and_return() -> None:
