@@ -84,6 +84,8 @@ class Simulation:
         self._measures = RunMeasures(self.stack)
         self._outside = OutsideInputs(dict(self.settings.user_values))
         self._begun: Tick | None = None
+        self._is_within_tick = False
+        """Whether a tick, or the first half of one, was started and has not returned."""
         self._links: Sequence[LinkEvent] = ()
         try:
             add_criteria(setup.criteria, self._state)
@@ -196,12 +198,20 @@ class Simulation:
         """
         self._check_continues()
         raise_if_limit_reached()
-        return self._tick()
+        self._is_within_tick = True
+        frame, end = self._tick()
+        self._is_within_tick = False
+        return frame, end
 
     def _check_continues(self) -> None:
-        if self._ended is not None or self._is_closed:
-            what = "the simulation is closed" if self._ended is None else "the run has ended"
-            raise SimulationError(f"{what}; a second run needs a second Simulation")
+        states = (
+            (self._ended is not None, "the run has ended"),
+            (self._is_closed, "the simulation is closed"),
+            (self._is_within_tick, "the run was aborted within a tick"),
+        )
+        for applies, state in states:
+            if applies:
+                raise SimulationError(f"{state}; a second run needs a second Simulation")
         self._observers.begin(self)
 
     @attributed
@@ -214,11 +224,13 @@ class Simulation:
         self._check_continues()
         raise_if_limit_reached()
         if self._begun is None:
+            self._is_within_tick = True
             view = self.world.view()
             perceived = self.stack.perceive(self.world, view, self._state.inputs)
             commands = self._tick_storyboard(view)
             end = self._state.exit or scheduled_end(self.storyboard, view.time, self.settings.time_limit)
             self._begun = Tick(view, perceived, end is not None, commands)
+            self._is_within_tick = False
         return self._begun
 
     def _tick_storyboard(self, view: WorldView) -> Commands:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
 from eidrive_scenario.errors import ExtensionError, SimulationError
@@ -114,3 +116,21 @@ def test_tick_after_the_end_is_an_error() -> None:
         with pytest.raises(SimulationError, match="the run has ended; a second run needs a second Simulation"):
             simulation.tick()
         assert simulation.result().end_reason == "time limit"
+
+
+@pytest.mark.parametrize("step", [Simulation.tick, Simulation.begin_tick])
+def test_tick_after_an_aborted_tick_is_an_error(
+    step: Callable[[Simulation], object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("physics")
+
+    with Simulation(ONE) as simulation:
+        simulation.tick()
+        with monkeypatch.context() as patch:
+            patch.setattr(type(simulation.storyboard), "tick", fail)
+            with pytest.raises(ZeroDivisionError):
+                step(simulation)
+        for again in (simulation.tick, simulation.begin_tick):
+            with pytest.raises(SimulationError, match="the run was aborted within a tick; a second run needs"):
+                again()
