@@ -74,10 +74,12 @@ class _Loader(Composer, SafeConstructor, Resolver):
             if key.tag == "tag:yaml.org,2002:merge":
                 raise yaml.constructor.ConstructorError(None, None, _MERGE, key.start_mark)
             if key.value in seen:
-                message = f"duplicate key {quoted(key.value, 100)}"
-                raise yaml.constructor.ConstructorError(None, None, message, key.start_mark)
+                raise _duplicate(key)
             seen.add(key.value)
         mapping: dict[Hashable, Any] = super().construct_mapping(node, deep)
+        if len(mapping) < len(node.value):  # two spellings of an equal key, such as 1 and 1.0
+            keys = [self.construct_object(key) for key, _ in node.value]
+            raise _duplicate(next(key for n, (key, _) in enumerate(node.value) if keys[n] in keys[:n]))
         return mapping
 
     def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
@@ -99,6 +101,11 @@ class _Loader(Composer, SafeConstructor, Resolver):
         "tag:yaml.org,2002:float": construct_yaml_float,
         None: construct_undefined,
     }
+
+
+def _duplicate(key: yaml.ScalarNode) -> yaml.constructor.ConstructorError:
+    message = f"duplicate key {quoted(key.value, 100)}"
+    return yaml.constructor.ConstructorError(None, None, message, key.start_mark)
 
 
 class _TextLoader(_Loader, Reader, Scanner, Parser):

@@ -57,6 +57,7 @@ def test_yaml_of_a_dataset_has_its_values_and_lines_by_each_parser() -> None:
         ("b: 1\na: " + "[" * MAX_DEPTH + "]" * MAX_DEPTH, "x:2: not valid YAML: nested too deeply"),
         ("\n[" + "1," * MAX_NODES + "]", f"x:2: not valid YAML: more than {MAX_NODES} values"),
         ("a: 1\nb: 2\na: 3\n", "x:3: not valid YAML: duplicate key 'a'"),
+        ("1: a\nb: 2\n1.0: c\n", "x:3: not valid YAML: duplicate key '1.0'"),
         ("a: 1\nb: " + "1" * 41, "x:2: not valid YAML: a number has more than 40 digits"),
         ("a: 1\nb: [1}\n", "x:2: not valid YAML: expected ',' or ']', but got '}'"),
     ],
