@@ -68,7 +68,8 @@ class Diagnostic:
             object.__setattr__(self, "hint", shortened(self.hint))
 
     def __str__(self) -> str:
-        location = f"{self.source}:{self.line}" if self.line is not None else self.source
+        source = self.source.replace("\n", "\\u000a")  # a name with a newline must not look like another message
+        location = f"{source}:{self.line}" if self.line is not None else source
         head = f"{location}: {self.message}" if location else self.message
         return f"{head}; {self.hint}" if self.hint else head
 

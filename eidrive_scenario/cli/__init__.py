@@ -57,7 +57,7 @@ class CommandTable(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         """Return a command. Raise KeyError if none has this name."""
         if name not in self._created:
-            from eidrive_scenario.cli.options import ShortHelp
+            from eidrive_scenario.cli.options import Command, ShortHelp
 
             if name in FUNCTIONS:  # first, so that no package replaces a command of the engine
                 module, _, function = FUNCTIONS[name].partition(":")
@@ -67,7 +67,7 @@ class CommandTable(Mapping[str, Any]):
             else:
                 raise KeyError(name)
             app = typer.Typer(add_completion=False)
-            app.command(name=name, cls=ShortHelp if name in _SHORT else None)(command)
+            app.command(name=name, cls=ShortHelp if name in _SHORT else Command)(command)
             self._created[name] = get_command(app)
         return self._created[name]
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from eidrive_scenario.cli.options import HelpAll, check_output_paths, parse_seeds, takes_run_options
-from eidrive_scenario.cli.output import echo, print_warnings
+from eidrive_scenario.cli.output import echo, echo_path, print_warnings
 from eidrive_scenario.errors import ABORTED, PASSED, Diagnostic, SettingError, counted
+from eidrive_scenario.files.encodable import in_one_line
 from eidrive_scenario.run_options import RunSettings
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def dataset(
     warned = Counter(warning for run in runs for warning in run.warnings)
     print_warnings(f"{warning} ({count} of {counted(len(runs), 'run')})" for warning, count in warned.items())
     kept = f", {len(planned) - len(runs)} already complete" if len(runs) < len(planned) else ""
-    echo(f"{counted(len(runs), 'run')}, {counted(frames, 'frame')}{kept}; {out}")
+    echo(f"{counted(len(runs), 'run')}, {counted(frames, 'frame')}{kept}; {in_one_line(str(out))}")
     raise typer.Exit(ABORTED if failed else PASSED)
 
 
@@ -113,5 +114,5 @@ def _import(folder: Path, out: Path) -> None:
     from eidrive_scenario.export.dataset_import import import_recordings
 
     for path, warnings in import_recordings(folder, out):
-        echo(str(path))
-        print_warnings(f"{path.name}: {warning}" for warning in warnings)
+        echo_path(path)
+        print_warnings(f"{in_one_line(path.name)}: {warning}" for warning in warnings)

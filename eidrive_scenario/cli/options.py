@@ -25,7 +25,24 @@ _DESCRIBED = "eidrive_scenario.cli.options"
 """Key of the context under which `--help-all` is stored."""
 
 
-class ShortHelp(TyperCommand):
+class Command(TyperCommand):
+    """Command that refuses an empty text as a folder of its output, which would be the current folder."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments. Raise SettingError for an empty folder."""
+        given, _, _ = self.make_parser(ctx).parse_args(args=[*args])  # typer itself replaces the empty path by `.`
+        for option in self.params:
+            flag = next((flag for flag in option.opts if flag in _FOLDERS), None)
+            if flag is not None and given.get(option.name) == "":
+                raise SettingError(Diagnostic(f"{flag} is an empty path", "give . for the current folder"))
+        return super().parse_args(ctx, args)
+
+
+_FOLDERS = ("--out", "--figures")
+"""Options of folders. A file with an empty path cannot be written anyway."""
+
+
+class ShortHelp(Command):
     """Command whose help names the options of panel `RARE` in its last lines, and describes them with `--help-all`."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:

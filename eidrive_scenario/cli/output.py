@@ -27,7 +27,7 @@ from eidrive_scenario.errors import (
     quoted,
 )
 from eidrive_scenario.files.atomic import standard_stream
-from eidrive_scenario.files.encodable import printable
+from eidrive_scenario.files.encodable import in_one_line, printable
 
 
 def make_writable() -> None:
@@ -47,7 +47,7 @@ def echo(message: object, *, err: bool = False, color: str = "") -> None:
 
 def echo_path(path: str | os.PathLike[str], *, err: bool = False) -> None:
     """Print the path of a written file on stdout, or on stderr if the file is stdout itself."""
-    echo(os.fspath(path), err=err or standard_stream(path) is not None)
+    echo(in_one_line(os.fspath(path)), err=err or standard_stream(path) is not None)
 
 
 def _with_option_names(text: str) -> str:
@@ -143,13 +143,13 @@ def print_error(error: BaseException, what: str = "run", file: object = None) ->
     what  run, check or judgement; omitted from the message of an error outside, such as an extension that does not load
     file  file whose check or judgement was aborted; None for a run
     """
-    prefix = f"{file}: " if file is not None else ""
+    prefix = f"{in_one_line(str(file))}: " if file is not None else ""
     error = _attribute(error)
     if isinstance(error, EidriveError):
         subject = f"{what} " if isinstance(error, SimulationError) or file is not None else ""
         echo(f"{prefix}{subject}aborted: {error}", err=True)
     elif isinstance(error, OSError) and error.strerror:
-        filename = f": {error.filename}" if error.filename is not None else ""
+        filename = f": {in_one_line(str(error.filename))}" if error.filename is not None else ""
         echo(f"{prefix}aborted: {error.strerror}{filename}", err=True)
     else:
         echo(f"{prefix}internal error: {type(error).__name__}: {error}", err=True)

@@ -138,9 +138,9 @@ def atomic_output(path: Path) -> Iterator[Path]:
     """Yield the path to which a file is written until it is complete; then the file gets its final name.
 
     After an error or an interruption the file keeps the partial name, so that it is not mistaken for a complete run;
-    after invalid input it is removed. Two runs never write the same file at the same time. A path that is not a
-    regular file, such as /dev/stdout, is written directly. Raise OutputError if the path is a folder, or if another
-    run writes there.
+    after invalid input it is removed. Errors of the file state the final name. Two runs never write the same file at
+    the same time. A path that is not a regular file, such as /dev/stdout, is written directly. Raise OutputError if the
+    path is a folder, or if another run writes there.
     """
     if os.path.isdir(path):
         raise OutputError(Diagnostic("cannot write: Is a directory", "choose another place", str(path)))
@@ -151,9 +151,15 @@ def atomic_output(path: Path) -> Iterator[Path]:
     with exclusive(path):
         try:
             yield unfinished
-        except InputError:
+        except InputError as error:
             with suppress(OSError):
                 unfinished.unlink()
+            if isinstance(error, OutputError) and any(one.source == str(unfinished) for one in error.diagnostics):
+                raise OutputError([replace(one, source=str(path)) for one in error.diagnostics]) from error
+            raise
+        except OSError as error:
+            if error.filename == str(unfinished):
+                error.filename = str(path)
             raise
         unfinished.replace(path)
 
@@ -169,15 +175,10 @@ def write_atomically(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         try:
             with create(unfinished) as stream:
                 yield stream
-        except BaseException as error:
+        except BaseException:
             if unfinished != path:
                 with suppress(OSError):
                     unfinished.unlink()
-            if isinstance(error, OSError) and error.filename == str(unfinished):
-                error.filename = str(path)
-            if isinstance(error, OutputError):
-                diagnostics = [replace(diagnostic, source=str(path)) for diagnostic in error.diagnostics]
-                raise OutputError(diagnostics) from error
             raise
 
 

@@ -1,5 +1,6 @@
 """Output paths: never an input file, and never one file for two outputs."""
 
+import errno
 import re
 import shutil
 from pathlib import Path
@@ -11,6 +12,7 @@ from openscenario_xml import road_file_xml
 
 from eidrive_scenario.cli.options import check_output_paths
 from eidrive_scenario.errors import SettingError
+from eidrive_scenario.files.atomic import atomic_output
 
 CATALOGS = Path(__file__).parents[2] / "data" / "catalogs"
 CATALOG_LOCATIONS = """<CatalogLocations>
@@ -166,3 +168,24 @@ def test_check_output_paths_allows_device_twice(tmp_path: Path) -> None:
     check_output_paths({"--csv": "/dev/null", "--log": "/dev/null"}, ["none"])
     with pytest.raises(SettingError):
         check_output_paths({"--csv": tmp_path / "a", "--log": tmp_path / "a"}, [])
+
+
+@pytest.mark.parametrize("command", ["run {own} --out=", "report {folder} --out=", "report {folder} --figures="])
+def test_empty_folder_of_output_is_invalid_input(
+    eidrive: Eidrive, own: Path, command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(own.parent)
+    before = sorted(own.parent.iterdir())
+    result = eidrive(*command.format(own=own, folder=own.parent).split())
+    assert (result.exit_code, "is an empty path; give . for the current folder" in result.stderr) == (2, True)
+    assert sorted(own.parent.iterdir()) == before
+
+
+def test_error_of_a_file_that_is_written_states_its_final_name(eidrive: Eidrive, own: Path, tmp_path: Path) -> None:
+    """The file has a partial name until it is complete."""
+    (tmp_path / "a.partial.csv").mkdir()
+    result = eidrive("run", own, "--csv", tmp_path / "a.csv")
+    assert (result.exit_code, f"{tmp_path / 'a.csv'}: cannot write: Is a directory" in result.stderr) == (2, True)
+    with pytest.raises(OSError, match="full") as caught, atomic_output(tmp_path / "b.csv") as unfinished:
+        raise OSError(errno.ENOSPC, "full", str(unfinished))
+    assert caught.value.filename == str(tmp_path / "b.csv")

@@ -115,6 +115,17 @@ def test_control_characters_of_a_scenario_are_escaped(passing_by: Path, tmp_path
     assert not set("\x9b\u202e") & set(text)
 
 
+@pytest.mark.process
+def test_newline_in_a_file_name_is_escaped(tmp_path: Path) -> None:
+    broken = tmp_path / "a\nb.xosc"
+    broken.write_text("<no/>", encoding="utf-8")
+    for command in ("run", "check", "view"):
+        printed = eidrive(command, broken)
+        text = (printed.stdout + printed.stderr).decode()
+        assert r"a\u000ab.xosc" in text
+        assert "\nb.xosc" not in text
+
+
 def test_file_name_with_undecodable_bytes_is_invalid_input(passing_by: Path, tmp_path: Path) -> None:
     copy = Path(os.fsdecode(os.fsencode(tmp_path) + b"/b\xffd.xosc"))
     try:
