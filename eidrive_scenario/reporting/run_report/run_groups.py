@@ -21,6 +21,8 @@ _EMPTY = ("", "[]", "{}", "null")
 """Texts of settings without a value, which headings omit."""
 _OPTIONS = [option.name for option in OPTIONS if option.detail and option.name != "channel"]
 """Options of a run that change many of its settings; the channel is in each heading."""
+_SCENARIO_FILE = "files.scenario "
+"""Start of the path of the digest of a scenario file, which no axis and no number of a run changes."""
 _SHOWN = 200
 """Maximum number of characters of a value in a heading."""
 
@@ -95,7 +97,10 @@ def _groups_of(scenario: str, runs: Sequence[ReportedRun]) -> list[RunGroup]:
     names = dict.fromkeys(name for of_run in settings for name in of_run)
     values = {name: [of_run.get(name, "") for of_run in settings] for name in names}
     differing = [
-        name for name in names if len(set(values[name])) > 1 and not _depends_on_axes(values[name], runs, axes)
+        name
+        for name in names
+        if len(set(values[name])) > 1
+        and (name.startswith(_SCENARIO_FILE) or not _depends_on_axes(values[name], runs, axes))
     ]
     grouped: dict[tuple[str, ...], list[ReportedRun]] = {}
     for run, of_run in zip(runs, settings, strict=True):

@@ -163,6 +163,15 @@ def test_runs_of_a_distribution_are_one_group_with_its_varied_parameters() -> No
     assert (dict(group.differing), group.varied) == ({}, ("Speed",))
 
 
+def test_runs_of_different_files_of_one_name_are_different_groups() -> None:
+    """Other numbers of runs of two distributions, whose files have one name."""
+    runs = []
+    for number, digest in enumerate(("a" * 64, "a" * 64, "b" * 64)):
+        files = [{"role": "scenario", "name": "s.xosc", "sha256": digest}]
+        runs.append(swept(8.0, files=files).model_copy(update={"run": number, "axes": {}, "sweep": ""}))
+    assert [len(group.runs) for group in group_runs(runs)] == [2, 1]
+
+
 def test_report_counts_copied_result_once(tmp_path: Path) -> None:
     one = run()
     page = write_run_report([one, dict(one), run(seed=2)], tmp_path)
