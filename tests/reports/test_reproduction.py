@@ -13,15 +13,17 @@ import pytest
 from eidrive_reports.reproduction import provenance
 from eidrive_reports.reproduction.episodes import ObjectCounter
 from eidrive_reports.reproduction.layout import Column, DataTable, Row, as_csv, plain
-from eidrive_reports.reproduction.part import Part
+from eidrive_reports.reproduction.part import Part, seed_of_block
 from eidrive_reports.reproduction.parts import ALL, PARTS, selected_detectors, selected_parts
 from eidrive_reports.reproduction.provenance import job_digest
 from eidrive_reports.reproduction.reproduce import Record
 from known_episodes import episode
+from lone_car import lone_car
 from opendrive_xml import map_xml, road_xml
 from openscenario_xml import road_file_xml, scenario_xml
 
 from eidrive_scenario.errors import SettingError
+from eidrive_scenario.extensions.registry import register, registry
 from eidrive_scenario.simulation import RunSettings
 
 # Record
@@ -98,6 +100,30 @@ def test_digest_changes_with_the_road_file_of_a_scenario_of_a_user(tmp_path: Pat
         (folder / "own.xosc").write_bytes(scenario_xml(road=road_file_xml("road.xodr")))
         digests.add(job_digest(str(folder / "own.xosc"), RunSettings()))
     assert len(digests) == 2
+
+
+def test_digest_changes_with_the_extension_that_only_a_scenario_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = tmp_path / "digest_own_planner.py"
+    code = "from eidrive_scenario.driving.planning.route_planner import RoutePlanner\nclass Own(RoutePlanner): ...\n"
+    module.write_text(code)
+    monkeypatch.syspath_prepend(tmp_path)
+    scenario = tmp_path / "own.xosc"
+    scenario.write_bytes(lone_car(1.0).replace(b'value="route"', b'value="own"'))
+    register("planners", "own", "digest_own_planner:Own")
+    try:
+        before = job_digest(str(scenario), RunSettings())
+        module.write_text(f"{code}# changed\n")
+        assert job_digest(str(scenario), RunSettings()) != before
+    finally:
+        del registry("planners")._points["own"]
+
+
+def test_seeds_of_blocks_differ_beyond_a_thousand_episodes() -> None:
+    seeds = {(block, seed): seed_of_block(seed, block, 3) for block in range(3) for seed in range(1, 2501)}
+    assert len(set(seeds.values())) == 7500
+    assert all(seeds[block, seed] == 1000 * block + seed for block, seed in seeds if seed <= 1000)
 
 
 def test_tables_in_the_checkout_do_not_change_its_commit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -195,7 +195,8 @@ def cases(detectors: Sequence[str]) -> list[Case]:
     for detector, ((scenario, planner), blocks) in product(detectors, BLOCKS.items()):
         for ((fault, value), channel), block in product(FAULTS.items(), range(blocks)):
             name = arm_of(detector, planner, fault, value, block)
-            runs.append(Case(scenario, name, _settings(scenario, detector, planner, channel), shift=1000 * block))
+            settings = _settings(scenario, detector, planner, channel)
+            runs.append(Case(scenario, name, settings, block=block, blocks=blocks))
     for detector, access, stations in product(detectors, ACCESS, STATIONS):
         settings = _settings(LOADED[0], detector, LOADED[1], loaded(access), sender="RSU")
         runs.append(Case(LOADED[0], f"{detector} {access} {stations}", settings, load=stations - 2))

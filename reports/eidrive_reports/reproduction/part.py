@@ -13,6 +13,15 @@ from eidrive_reports.reproduction.provenance import job_digest
 from eidrive_reports.studies import group_by
 from eidrive_scenario.api.run import RunSettings
 
+_BLOCK = 1000
+"""Number of consecutive seeds of a block."""
+
+
+def seed_of_block(seed: int, block: int, blocks: int) -> int:
+    """Return the seed of an episode, from 1, in one of several blocks, which have no seed in common."""
+    cycle, position = divmod(seed - 1, _BLOCK)
+    return (cycle * blocks + block) * _BLOCK + position + 1
+
 
 @dataclass(frozen=True)
 class Case:
@@ -22,7 +31,7 @@ class Case:
     counted  station whose objects after fusion are counted; "" for none
     varied   function that returns the parameters of a seed, if the part draws them instead of the scenario
     load     number of stations that are added to the scenario and send CAM; see `with_load`
-    shift    number that is added to the seed, so that an arm can have several runs per episode
+    block    number of the arm among the `blocks` arms of equal settings, so that these have several runs per episode
     conditions  conditions under which the perception of the ego is measured in the same run
     """
 
@@ -32,12 +41,13 @@ class Case:
     counted: str = ""
     varied: Callable[[int], Mapping[str, str]] | None = None
     load: int = 0
-    shift: int = 0
+    block: int = 0
+    blocks: int = 1
     conditions: tuple[Condition, ...] = ()
 
     def job(self, seed: int) -> EpisodeJob:
         """Return the run of a seed."""
-        seed += self.shift
+        seed = seed_of_block(seed, self.block, self.blocks)
         settings = self.settings
         if self.varied is not None:
             settings = replace(settings, parameters={**settings.parameters, **self.varied(seed)})

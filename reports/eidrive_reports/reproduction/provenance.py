@@ -18,7 +18,7 @@ from typing import Any
 from eidrive_reports import cooperative_perception
 from eidrive_reports.cooperative_perception.receivers import Condition
 from eidrive_reports.reproduction import channel_load, episodes
-from eidrive_scenario.api.common import Diagnostic, SettingError, load_json, registry, write_atomically
+from eidrive_scenario.api.common import Diagnostic, InputError, SettingError, load_json, registry, write_atomically
 from eidrive_scenario.api.experiments import (
     average_precision,
     canonical_json,
@@ -26,7 +26,7 @@ from eidrive_scenario.api.experiments import (
     resolve_scenario,
     sha256_of,
 )
-from eidrive_scenario.api.run import RunSettings, load_scenario
+from eidrive_scenario.api.run import RunSettings, Simulation, load_scenario
 
 PACKAGES = ("eidrive_scenario", "eidrive_behaviors", "eidrive_criteria")
 """Packages of this project whose code a run executes."""
@@ -50,7 +50,7 @@ def job_digest(scenario: str, settings: RunSettings, *, load: int = 0, condition
     """
     given = {name: str(value) for name, value in asdict(settings).items()}
     content = {"code": code_digest(), "scenario": _scenario_digest(scenario), "settings": given, "load": load}
-    own = _own_files(settings)
+    own = [*_own_files(settings), *_named_modules(scenario)]
     if own:
         content["files"] = [sha256_of(path.read_bytes()) for path in own]
     if conditions:
@@ -67,6 +67,20 @@ def _own_files(settings: RunSettings) -> list[Path]:
     used = [(registry(kind), name) for kind, name in named if name is not None]
     modules = [Path(getfile(group.load(name))) for group, name in used if group.distribution(name) is not None]
     return modules + [path for path in map(Path, map(str, settings.sources)) if _is_file(path)]
+
+
+@cache
+def _named_modules(scenario: str) -> tuple[Path, ...]:
+    """Return the modules of extensions of others that a scenario names; those of the library name none."""
+    path = resolve_scenario(scenario)
+    if path.is_relative_to(library_path()):
+        return ()
+    try:
+        with Simulation(path, load_weights=False) as simulation:
+            names = [name.partition(".") for name in simulation.resolved.extensions]
+    except InputError:  # the settings of a job may give what the scenario lacks
+        return ()
+    return tuple(Path(getfile(registry(kind).load(name))) for kind, _, name in names)
 
 
 def _is_file(path: Path) -> bool:

@@ -26,7 +26,7 @@ from eidrive_reports.reproduction.layout import (
     scenario_title,
     where,
 )
-from eidrive_reports.reproduction.part import Case, Part, by_case
+from eidrive_reports.reproduction.part import Case, Part, by_case, seed_of_block
 from eidrive_scenario.api.common import generator
 from eidrive_scenario.api.experiments import wilson
 from eidrive_scenario.api.run import RunSettings
@@ -166,7 +166,11 @@ def _case(
     settings = RunSettings(
         detector=detector, planner=planner, channel=channel, parameters=parameters, time_limit=DURATION
     )
-    return Case(scenario, f"{detector} {planner} {label}", settings, varied=lambda seed: offsets(1000 * block + seed))
+
+    def varied(seed: int) -> dict[str, str]:
+        return offsets(seed_of_block(seed, block, CURVE_SEEDS))
+
+    return Case(scenario, f"{detector} {planner} {label}", settings, varied=varied)
 
 
 def map_rows(episodes: Sequence[Episode], detectors: Sequence[str]) -> Iterator[Row]:
