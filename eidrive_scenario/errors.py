@@ -68,7 +68,7 @@ class Diagnostic:
             object.__setattr__(self, "hint", shortened(self.hint))
 
     def __str__(self) -> str:
-        source = self.source.replace("\n", "\\u000a")  # a name with a newline must not look like another message
+        source = in_one_line(self.source)
         location = f"{source}:{self.line}" if self.line is not None else source
         head = f"{location}: {self.message}" if location else self.message
         return f"{head}; {self.hint}" if self.hint else head
@@ -285,6 +285,11 @@ def limit_diagnostics(diagnostics: Sequence[Diagnostic], count: int = 0) -> list
     listed = list(diagnostics[:MAX_DIAGNOSTICS])
     unlisted = len(diagnostics) - len(listed) + count
     return [*listed, Diagnostic.at(listed[-1], f"{unlisted} more are not listed")]
+
+
+def in_one_line(name: object) -> str:
+    """Return the name of a file with escapes of newlines, so that no part of it looks like another message."""
+    return str(name).replace("\n", "\\u000a")
 
 
 def shortened(text: str, length: int = MAX_TEXT) -> str:

@@ -13,8 +13,7 @@ from eidrive_scenario.base.wall_limit import LimitReached, limit_wall_time
 from eidrive_scenario.cli.options import HelpAll, check_output_paths, takes_run_options
 from eidrive_scenario.cli.output import echo, print_error, print_unused_projects
 from eidrive_scenario.cli.supervision import supervise
-from eidrive_scenario.errors import ABORTED, INVALID_INPUT, Diagnostic, InputError, WallLimitError, counted
-from eidrive_scenario.files.encodable import in_one_line
+from eidrive_scenario.errors import ABORTED, INVALID_INPUT, Diagnostic, InputError, WallLimitError, counted, in_one_line
 from eidrive_scenario.run_options import FLAGS, RunSettings, check_seconds, diagnostic_with_option_names
 
 if TYPE_CHECKING:
@@ -84,7 +83,7 @@ def check(
                     echo(f"{diagnostic}{_suffix(level, diagnostic.rule)}")
             printed[level].update(dict.fromkeys(diagnostics))
         if isinstance(report, DistributionCheckReport) and report.runs:
-            echo(f"{in_one_line(str(path))}: {counted(report.runs, 'run')}")
+            echo(f"{in_one_line(path)}: {counted(report.runs, 'run')}")
     print_unused_projects(printed["error"])
     if sarif is not None:
         _write_sarif(sarif, printed, aborted)

@@ -10,8 +10,7 @@ import typer
 
 from eidrive_scenario.cli.options import HelpAll, check_output_paths, parse_seeds, takes_run_options
 from eidrive_scenario.cli.output import echo, echo_path, print_warnings
-from eidrive_scenario.errors import ABORTED, PASSED, Diagnostic, SettingError, counted
-from eidrive_scenario.files.encodable import in_one_line
+from eidrive_scenario.errors import ABORTED, PASSED, Diagnostic, SettingError, counted, in_one_line
 from eidrive_scenario.run_options import RunSettings
 
 if TYPE_CHECKING:
@@ -97,7 +96,7 @@ def dataset(
     warned = Counter(warning for run in runs for warning in run.warnings)
     print_warnings(f"{warning} ({count} of {counted(len(runs), 'run')})" for warning, count in warned.items())
     kept = f", {len(planned) - len(runs)} already complete" if len(runs) < len(planned) else ""
-    echo(f"{counted(len(runs), 'run')}, {counted(frames, 'frame')}{kept}; {in_one_line(str(out))}")
+    echo(f"{counted(len(runs), 'run')}, {counted(frames, 'frame')}{kept}; {in_one_line(out)}")
     raise typer.Exit(ABORTED if failed else PASSED)
 
 

@@ -23,11 +23,12 @@ from eidrive_scenario.errors import (
     ExtensionError,
     InputError,
     SimulationError,
+    in_one_line,
     most_similar,
     quoted,
 )
 from eidrive_scenario.files.atomic import standard_stream
-from eidrive_scenario.files.encodable import in_one_line, printable
+from eidrive_scenario.files.encodable import printable
 
 
 def make_writable() -> None:
@@ -143,13 +144,13 @@ def print_error(error: BaseException, what: str = "run", file: object = None) ->
     what  run, check or judgement; omitted from the message of an error outside, such as an extension that does not load
     file  file whose check or judgement was aborted; None for a run
     """
-    prefix = f"{in_one_line(str(file))}: " if file is not None else ""
+    prefix = f"{in_one_line(file)}: " if file is not None else ""
     error = _attribute(error)
     if isinstance(error, EidriveError):
         subject = f"{what} " if isinstance(error, SimulationError) or file is not None else ""
         echo(f"{prefix}{subject}aborted: {error}", err=True)
     elif isinstance(error, OSError) and error.strerror:
-        filename = f": {in_one_line(str(error.filename))}" if error.filename is not None else ""
+        filename = f": {in_one_line(error.filename)}" if error.filename is not None else ""
         echo(f"{prefix}aborted: {error.strerror}{filename}", err=True)
     else:
         echo(f"{prefix}internal error: {type(error).__name__}: {error}", err=True)

@@ -31,8 +31,8 @@ from eidrive_scenario.errors import (
     EidriveError,
     InputError,
     SettingError,
+    in_one_line,
 )
-from eidrive_scenario.files.encodable import in_one_line
 from eidrive_scenario.recording.run_files import RecordMode
 from eidrive_scenario.run_options import RunSettings, check_seconds
 
@@ -308,7 +308,7 @@ class _Runs:
 
             show(result, varied=varied)
         if result.folder is not None:
-            echo(f"files: {in_one_line(str(result.folder))}", err=self.json)
+            echo(f"files: {in_one_line(result.folder)}", err=self.json)
 
 
 def _with_suffixes(path: Path, suffixes: list[str]) -> Path:

@@ -11,8 +11,7 @@ import typer
 
 from eidrive_scenario.cli.options import check_output_paths
 from eidrive_scenario.cli.output import echo, echo_path, print_warning, print_warnings
-from eidrive_scenario.errors import Diagnostic, SettingError
-from eidrive_scenario.files.encodable import in_one_line
+from eidrive_scenario.errors import Diagnostic, SettingError, in_one_line
 
 PictureSize = Annotated[
     str | None, typer.Option(metavar="WxH", help="Width and height of the picture in mm.", show_default="160x90")
@@ -235,10 +234,10 @@ def view(
         from eidrive_scenario.reporting.replay.page import make_replay
 
         damage = make_replay(opened, page, other=None if second is None else open_recording(second))
-    print_warnings(f"{in_one_line(str(path))}: {line}" for line in damage)
+    print_warnings(f"{in_one_line(path)}: {line}" for line in damage)
     partials = filter(is_partial, [path, *([second] if second else [])])
     reason = "the run did not end, the recording is incomplete"
-    print_warnings(f"{in_one_line(str(partial))}: {reason}" for partial in partials)
+    print_warnings(f"{in_one_line(partial)}: {reason}" for partial in partials)
     for written in (*stills.values(), gif, mp4, page):
         if written is not None:
             echo_path(written)

@@ -154,9 +154,11 @@ def atomic_output(path: Path) -> Iterator[Path]:
         except InputError as error:
             with suppress(OSError):
                 unfinished.unlink()
-            if isinstance(error, OutputError) and any(one.source == str(unfinished) for one in error.diagnostics):
-                raise OutputError([replace(one, source=str(path)) for one in error.diagnostics]) from error
-            raise
+            if not isinstance(error, OutputError):
+                raise
+            sources = {str(unfinished): str(path)}
+            renamed = [replace(one, source=sources.get(one.source, one.source)) for one in error.diagnostics]
+            raise OutputError(renamed) from error
         except OSError as error:
             if error.filename == str(unfinished):
                 error.filename = str(path)

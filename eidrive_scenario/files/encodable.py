@@ -23,11 +23,3 @@ def printable(text: str) -> str:
     the same meaning as the characters.
     """
     return _CONTROL.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
-
-
-def in_one_line(name: str) -> str:
-    """Return the name of a file for a line of a terminal: newlines are escaped as `printable` escapes other characters.
-
-    Else a part of the name would look like another message.
-    """
-    return printable(name).replace("\n", "\\u000a")
