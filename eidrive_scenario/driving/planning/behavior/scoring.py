@@ -80,10 +80,11 @@ WEIGHTS = Weights()
 
 
 class Evaluation(msgspec.Struct, frozen=True):
-    """Scores (P,); time of the first collision (P,), inf without one [s]; greatest risk (P,) in [0, 1];
-    hypothesis that causes the first collision (P,), -1 without one."""
+    """Scores (P,), and their part for progress (P,); time of the first collision (P,), inf without one [s]; greatest
+    risk (P,) in [0, 1]; hypothesis that causes the first collision (P,), -1 without one."""
 
     score: Array
+    progress: Array
     collision: Array
     risk: Array
     cause: Array
@@ -126,10 +127,10 @@ def evaluate(
             cause = np.where(cause >= 0, near[cause], -1)
             impact = np.where(np.isfinite(collision), rolled.speed[np.arange(count), step], 0.0)
     far = max(limits.wanted * horizon, 1.0)
-    progress = np.minimum(np.maximum((rolled.s[:, -1] - rolled.s[:, 0]) / far, 0.0), 1.0)
+    progress = WEIGHTS.progress * np.minimum(np.maximum((rolled.s[:, -1] - rolled.s[:, 0]) / far, 0.0), 1.0)
     slowing = (rolled.speed[:, 1:] - rolled.speed[:, :-1]) / (times[1:] - times[:-1])
     hardest = np.maximum(-slowing.min(axis=1) - COMFORTABLE, 0.0)
-    score = WEIGHTS.progress * progress - WEIGHTS.comfort * np.minimum(hardest / settings.hard_deceleration, 2.0)
+    score = progress - WEIGHTS.comfort * np.minimum(hardest / settings.hard_deceleration, 2.0)
     score -= WEIGHTS.risk * risk
     crash = 1.0 + (1.0 - collision / horizon) + 0.05 * impact
     score -= WEIGHTS.crash * np.where(np.isfinite(collision), crash, 0.0)
@@ -148,7 +149,7 @@ def evaluate(
             continue
         lanes = WEIGHTS.aside * (profile.side != 0) + WEIGHTS.oncoming * profile.uses_oncoming
         values[index] -= lanes + WEIGHTS.switch * switches + WEIGHTS.refused * (proposal.profile in refused)
-    return Evaluation(np.array(values), collision, risk, cause)
+    return Evaluation(np.array(values), progress, collision, risk, cause)
 
 
 def _overrun(
@@ -367,7 +368,7 @@ class Options(msgspec.Struct, frozen=True):
         maneuver.
 
         With the emergency brake, that is one of them if the best other one collides soon, or has a risk as of a near
-        contact.
+        contact, and is worse apart from its progress.
         """
         count = len(self.options) if profiles is None else profiles
         counts = [option.proposal.profile < count and name in (None, option.profile.name) for option in self.options]
@@ -378,7 +379,9 @@ class Options(msgspec.Struct, frozen=True):
         best = int(np.argmax(score))
         collision, risk = float(self.evaluation.collision[best]), float(self.evaluation.risk[best])
         is_urgent = collision < URGENT or risk > 1.0 - FARTHER * URGENT / self.horizon
-        return brake if with_brake and is_urgent and braking > score[best] else best
+        progress = self.evaluation.progress
+        is_better = braking - progress[brake] > score[best] - progress[best]
+        return brake if with_brake and is_urgent and is_better else best
 
     def uncertain_threat(self, best: int, certain: Bools, *, is_hard: bool) -> int | None:
         """Return the hypothesis of an object of uncertain existence for which a proposal brakes hard, if there is one.

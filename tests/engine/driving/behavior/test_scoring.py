@@ -125,12 +125,14 @@ def test_comfortable_braking_leaves_the_distance_of_a_hard_stop(gap: float, cost
     [(3.9, 0.0, True), (4.1, 0.0, False), (math.inf, 0.61, True), (math.inf, 0.59, False)],
 )
 def test_emergency_brake_acts_for_what_is_near(collision: float, risk: float, brakes: bool) -> None:
-    """The risk of a contact decreases by 0.8 to the horizon of 8 s: to 0.6 in 4 s."""
+    """The risk of a contact decreases by 0.8 to the horizon of 8 s: to 0.6 in 4 s. The other option is better only by
+    its progress, for which the vehicle does not drive into what is near."""
     way = np.zeros((0, 1), dtype=bool)
     route = LateralProfile("route", (0.0,), (0.0,))
     proposals = (Proposal(0, 1.0, "all", 4.0), Proposal(0, 0.0, "all", 8.0, is_emergency=True))
     evaluation = Evaluation(
-        score=np.array([-100.0, -2.0]),
+        score=np.array([-1.0, -2.0]),
+        progress=np.array([4.0, 0.0]),
         collision=np.array([collision, np.inf]),
         risk=np.array([risk, 0.0]),
         cause=np.full(2, -1),
