@@ -104,12 +104,15 @@ def _write_signal(signals: Element, arm: Arm, number: str) -> None:
 
 
 def _write_houses(objects: Element, arm: Arm, clearance: float, first: int) -> None:
-    """Add a row of houses on each side, set back from the sidewalk and away from the corners of the junction."""
+    """Add a row of houses on each side, set back from the sidewalk and away from the corners of the junction.
+
+    A house beyond the end of the road is at this end.
+    """
     for side in (-1, 1):
         curb = sum(spec.width for spec in arm.street.side(side))
         from_junction = clearance
         for number, (length, depth, height) in enumerate(HOUSES if side > 0 else reversed(HOUSES)):
-            middle = from_junction + length / 2
+            middle = min(from_junction + length / 2, arm.road.length)
             add(
                 objects,
                 "object",

@@ -32,7 +32,7 @@ class MapRule(Enum):
     ROAD_SURFACE = "a cross section that is not read, or a superelevation that is too steep"
     ROAD_MARK = "an incomplete road mark"
     SIGNAL_OFF_ROAD = "a signal beyond the ends of its road"
-    OBJECT_OFF_ROAD = "a repetition of an object beyond the end of its road"
+    OBJECT_OFF_ROAD = "an object, or a repetition of one, beyond the ends of its road"
     LANE_LINK = "a lane link to a missing lane, or a lane without a successor"
     JUNCTION_CONNECTION = "a connection that does not match its junction"
 

@@ -67,21 +67,26 @@ def read_signals(
 
 def _read_place(road: Road, element: etree._Element, collector: AttributeReader) -> SignalPlace:
     orientation = element.get("orientation", "none")
-    s = collector.number(element, "s")
-    held = min(max(s, 0.0), road.length)
-    if abs(s - held) > BEYOND:
-        message = f"a signal is at s = {s:g} m of road {road.id!r}; s = {held:g} m is used"
-        kind, hint = "signals beyond the ends of their roads", f"the road extends from 0 to {road.length:g} m"
-        collector.report_warning(element, MapRule.SIGNAL_OFF_ROAD, kind, message, hint)
     return SignalPlace(
         road=road.id,
-        s=held,
+        s=_s_on_road(road, element, collector, "a signal", MapRule.SIGNAL_OFF_ROAD),
         t=collector.number(element, "t"),
         orientation=orientation if orientation in ("+", "-") else "none",
         validity=tuple(
             (collector.integer(v, "fromLane"), collector.integer(v, "toLane")) for v in element.iterfind("validity")
         ),
     )
+
+
+def _s_on_road(road: Road, element: etree._Element, collector: AttributeReader, name: str, rule: MapRule) -> float:
+    """Return the s coordinate of an element [m], that of the nearest end of the road if it is beyond it."""
+    s = collector.number(element, "s")
+    held = min(max(s, 0.0), road.length)
+    if abs(s - held) > BEYOND:
+        message = f"{name} is at s = {s:g} m of road {road.id!r}; s = {held:g} m is used"
+        kind = f"{name.split()[1]}s beyond the ends of their roads"
+        collector.report_warning(element, rule, kind, message, f"the road extends from 0 to {road.length:g} m")
+    return held
 
 
 def _read_signal(road: Road, element: etree._Element, collector: AttributeReader) -> Signal:
@@ -136,6 +141,10 @@ def read_object(road: Road, element: etree._Element, collector: AttributeReader)
         if abs(number(name)) > limit:
             collector.report_error(element, f"<object> has {name}={number(name):g}", f"{hint} {limit:g}")
     collector.spend(element, "objects", 1, MAX_OBJECTS)
+    repeats = tuple(_read_repeat(road, repeat, element, collector) for repeat in element.iterfind("repeat"))
+    s = collector.number(element, "s")
+    if not repeats:
+        s = _s_on_road(road, element, collector, "an object", MapRule.OBJECT_OFF_ROAD)
     areas: list[tuple[Corner, ...]] = []
     lines: list[tuple[Corner, ...]] = []
     for outline in (*element.iterfind("outline"), *element.iterfind("outlines/outline")):
@@ -149,7 +158,7 @@ def read_object(road: Road, element: etree._Element, collector: AttributeReader)
         type=element.get("type", "none"),
         subtype=element.get("subtype", ""),
         road=road.id,
-        s=collector.number(element, "s"),
+        s=s,
         t=collector.number(element, "t"),
         z_offset=number("zOffset"),
         heading=number("hdg"),
@@ -161,7 +170,7 @@ def read_object(road: Road, element: etree._Element, collector: AttributeReader)
         radius=number("radius"),
         outlines=tuple(areas),
         lines=tuple(lines),
-        repeats=tuple(_read_repeat(road, repeat, element, collector) for repeat in element.iterfind("repeat")),
+        repeats=repeats,
     )
 
 

@@ -191,6 +191,18 @@ def test_advance_passes_duplicate_geometry_in_both_directions() -> None:
         assert moved.s == pytest.approx(end)
 
 
+def test_objects_beyond_their_road_are_moved_to_its_end() -> None:
+    objects = "".join(f'<object id="{n}" type="tree" s="{s}" t="-5"/>' for n, s in enumerate((-3.0, 100.02, 140.0)))
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=section(), extra=f"<objects>{objects}</objects>")), "town.xodr")
+    assert [placed.pose.x for placed in placed_objects(network)] == [0.0, 100.0, 100.0]
+    (doubt,) = network.map_warnings
+    assert doubt.rule == "object-off-road"
+    assert str(doubt) == (
+        "town.xodr:1: an object is at s = -3 m of road '1'; s = 0 m is used; "
+        "1 more of objects beyond the ends of their roads: line 1; the road extends from 0 to 100 m"
+    )
+
+
 def test_signal_beyond_its_road_is_moved_to_its_end() -> None:
     signals = "".join(
         f'<signal id="{n}" s="{s}" t="-5" dynamic="yes" orientation="+" zOffset="2" type="1000001"/>'
