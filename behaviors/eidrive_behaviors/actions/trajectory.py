@@ -224,6 +224,9 @@ class FollowTrajectoryAction(ActionBehaviour):
     def _begin(self) -> None:
         """Prepare the first step from the actor's current pose, and the first one after a teleport."""
         motion, layout = self.actor.motion, self._layout
+        if self._begun_after >= 0 and not motion.teleported and self._timing is None and self._put != motion.pose:
+            # A TeleportAction after the decision on the last step replaced that step.
+            self._s = self._progress.at(self.context.view.tick - 1)
         self._begun_after = -1 if motion.teleported else motion.teleports  # This step shows the place of the teleport.
         self._update_heading()
         vehicle = self.actor.entity
@@ -289,7 +292,8 @@ class FollowTrajectoryAction(ActionBehaviour):
             return self._drive(self._pursuit)
         way = self._progress.way
         if self._timing is None:
-            after = self._s + way * motion.speed * dt
+            # The step of a teleport covers no distance.
+            after = self._s if motion.teleported else self._s + way * motion.speed * dt
             done = not layout.closed and self._leaves(self._s, after)
         else:
             clock = self._clock(dt)

@@ -192,8 +192,6 @@ class Motion(MotionState):
         if steering is not None and lane_distance is not None:
             # The requested distance applies, not that of the speed at which the lateral action decided.
             steering = steering._replace(distance=None)
-        if target is not None and lane_distance is not None and self._pose_at_distance is not None:
-            target = self._pose_at_distance(lane_distance)
         if self._stops and target is None:
             self._speed = 0.0
         self._stops = False
@@ -204,6 +202,8 @@ class Motion(MotionState):
             if self._leaves_curve:
                 self.leave_curve(after_step=False)
             return placement
+        if target is not None and lane_distance is not None and self._pose_at_distance is not None:
+            target = self._pose_at_distance(lane_distance)
         if self._route is not None and self._route_lanes is not None:
             if steering is None and target is None and lane_distance is None and distance > 0.0 and not self._crosses:
                 steering = self._step_towards_route(distance)
