@@ -13,7 +13,7 @@ import pytest
 from opendrive_xml import lanes_xml, map_xml, road_xml
 from openscenario_xml import round_car_xml
 from recorded_scene import RunScene
-from storyboard_xml import element_state_xml, lane_position_xml, speed_xml, teleport_xml, world_position_xml
+from storyboard_xml import element_state_xml, init_xml, lane_position_xml, speed_xml, teleport_xml, world_position_xml
 from street_scene import NOTHING, OPENING, after
 from trajectories import CORNER, follow_points
 from whole_run import Run
@@ -171,6 +171,29 @@ def offset(target: str, continuous: str = "false", acceleration: str = 'maxLater
     return f"""<PrivateAction><LateralAction><LaneOffsetAction continuous="{continuous}">
       <LaneOffsetActionDynamics dynamicsShape="cubic" {acceleration}/>
       <LaneOffsetTarget>{target}</LaneOffsetTarget></LaneOffsetAction></LateralAction></PrivateAction>"""
+
+
+STEP_ASIDE = offset('<AbsoluteTargetLaneOffset value="1"/>', acceleration="")
+
+
+@pytest.mark.parametrize("in_init", [False, True])
+@pytest.mark.parametrize(
+    ("first", "second", "middle", "end"),
+    [
+        (STEP_ASIDE, change(lane(-2)), -3.5, -6.0),
+        (change(lane(-2), "step", value=0.0), change(lane(-1)), -4.0, -2.0),
+        (teleport_xml(lane_position_xml(-2, 100.0)), STEP_ASIDE, -5.0, -5.0),
+    ],
+)
+def test_later_lateral_action_starts_from_the_result_of_a_lateral_step(
+    run: Run, in_init: bool, first: str, second: str, middle: float, end: float
+) -> None:
+    """From y = -1 or -6 linearly in 4 s; a step after a teleport starts from its place."""
+    steps = () if in_init else (("Ego", first), ("Ego", second))
+    played = run(4.5, *steps, driven=False, init=init_xml("Ego", first, second) if in_init else "")
+    for time, y in ((2.0, middle), (4.0, end)):
+        view = played.frames[round(time / 0.05)].view
+        assert view.position[view.rows["Ego"], 1] == pytest.approx(y, abs=1e-6)
 
 
 @pytest.mark.element("LaneOffsetAction")

@@ -102,6 +102,11 @@ class LaneChangeAction(ActionBehaviour):
         self._limited_offset: RateLimitedValue | None = None
         self._delay_warning = DelayWarning(self)
 
+    @property
+    def at_once(self) -> bool:
+        """True for a step that is not limited by the vehicle."""
+        return model.is_immediate(self._dynamics) and not self.actor.driven
+
     def initialise(self) -> None:
         """Find the target lane and express the actor's position as an offset from its center."""
         here = self.context.location(self.actor.name)

@@ -33,6 +33,12 @@ class LaneOffsetAction(ActionBehaviour):
     domains = Domain.LATERAL
     action: model.LaneOffsetAction
 
+    @property
+    def at_once(self) -> bool:
+        """True for an offset that is reached at once and not kept."""
+        is_immediate = model.is_immediate(self.action.lane_offset_action_dynamics)
+        return is_immediate and not self.action.continuous and not self.actor.driven
+
     def initialise(self) -> None:
         """Start the transition from the current offset."""
         motion = self.actor.motion

@@ -54,10 +54,7 @@ class SpeedAction(ActionBehaviour):
     @property
     def at_once(self) -> bool:
         """True for a step that is neither continuous nor limited by the vehicle."""
-        dynamics = self._dynamics
-        instantaneous = dynamics.dynamics_dimension is not model.DynamicsDimension.RATE and dynamics.value == 0.0
-        step = dynamics.dynamics_shape is model.DynamicsShape.STEP or instantaneous
-        return step and not self._continuous and not is_follow_mode(self._dynamics)
+        return model.is_immediate(self._dynamics) and not self._continuous
 
     @property
     def speed_reference(self) -> str | None:

@@ -8,7 +8,7 @@ from itertools import combinations
 from eidrive_scenario.base.tolerances import EPSILON
 from eidrive_scenario.checks.rule import at
 from eidrive_scenario.checks.scenario_rules.context import LintContext
-from eidrive_scenario.checks.scenario_rules.states import has_zero_rate, is_immediate, never_ends
+from eidrive_scenario.checks.scenario_rules.states import has_zero_rate, never_ends
 from eidrive_scenario.errors import Diagnostic
 from eidrive_scenario.openscenario import model
 
@@ -47,8 +47,8 @@ def _domains(action: model.Action) -> set[str]:
     leaf = next((element for element in elements if type(element) in _DOMAINS), None)
     if leaf is None:
         return set()
-    transitions = (part for part in leaf.walk() if isinstance(part, model.TransitionDynamics))
-    if any(map(is_immediate, transitions)) and not never_ends(action):
+    dynamics = model.TransitionDynamics | model.LaneOffsetActionDynamics
+    if any(model.is_immediate(part) for part in leaf.walk() if isinstance(part, dynamics)) and not never_ends(action):
         return set()
     domains = {_DOMAINS[type(leaf)]}
     if isinstance(leaf, model.FollowTrajectoryAction) and leaf.time_reference.timing is not None:

@@ -210,9 +210,3 @@ def has_zero_rate(dynamics: model.TransitionDynamics) -> bool:
     """Whether a transition never reaches its target because its rate is 0."""
     by_rate = dynamics.dynamics_dimension is model.DynamicsDimension.RATE and dynamics.value == 0.0
     return by_rate and dynamics.dynamics_shape is not model.DynamicsShape.STEP
-
-
-def is_immediate(dynamics: model.TransitionDynamics) -> bool:
-    """Whether a transition ends at its start."""
-    is_zero = dynamics.dynamics_dimension is not model.DynamicsDimension.RATE and dynamics.value == 0.0
-    return dynamics.dynamics_shape is model.DynamicsShape.STEP or is_zero

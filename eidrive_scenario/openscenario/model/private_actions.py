@@ -164,6 +164,15 @@ class LaneOffsetActionDynamics(Element):
     max_lateral_acc: float | None = None
 
 
+def is_immediate(dynamics: TransitionDynamics | LaneOffsetActionDynamics) -> bool:
+    """Whether a transition ends at its start, as the limits of the vehicle do not apply either."""
+    if isinstance(dynamics, LaneOffsetActionDynamics):
+        return dynamics.dynamics_shape is DynamicsShape.STEP or dynamics.max_lateral_acc is None
+    is_zero = dynamics.dynamics_dimension is not DynamicsDimension.RATE and dynamics.value == 0.0
+    is_step = dynamics.dynamics_shape is DynamicsShape.STEP or is_zero
+    return is_step and dynamics.following_mode is not FollowingMode.FOLLOW
+
+
 class LaneOffsetAction(Element, content=ALL):
     """Action that changes the lateral offset in the lane."""
 

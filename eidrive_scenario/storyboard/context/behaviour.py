@@ -82,8 +82,8 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
 
     @property
     def moves_over_time(self) -> bool:
-        """Whether it moves the actor beyond its start. In Init it starts from the state that the other actions set."""
-        return bool(self.controls & MOTION) and not self.at_once
+        """Whether it moves the actor sideways or beyond its start. In Init it starts from the state that others set."""
+        return bool(self.controls & (Domain.LATERAL if self.at_once else MOTION))
 
     @property
     def speed_reference(self) -> str | None:
@@ -138,6 +138,9 @@ class ActionBehaviour(py_trees.behaviour.Behaviour):
             self.status = new
         else:
             self.tick_once()
+            if self.status is Status.SUCCESS and self.controls & Domain.LATERAL and self.at_once:
+                self.actor.motion.apply_lateral_step()
+                self.actor.invalidate_location()
         if self.third_party or self.status is Status.INVALID:
             self.check_decision()
 

@@ -123,6 +123,16 @@ class Motion(MotionState):
         """Set the lateral part of the current step."""
         self._lateral_step, self._rests = steering, False
 
+    def apply_lateral_step(self) -> None:
+        """Execute the lateral part of the current step at once, so that later actions of the tick start from it."""
+        steering = self._lateral_step
+        if steering is None or self._location is None or self._crosses:
+            return
+        self._lateral_step = None
+        if self._route_lanes is not None:
+            self._route_lanes.forget()
+        self._move_along_lane(0.0, steering, 0.0)
+
     def move_to(
         self, pose: Pose, *, land: bool = False, jump: bool = False, rail: Callable[[float], Pose] | None = None
     ) -> None:

@@ -209,6 +209,17 @@ def test_conflicting_actions_include_continuous_steps(folder: Path) -> None:
         assert ("conflicting-actions" in violated_rules(folder, event)) == (continuous == "true")
 
 
+def test_conflicting_actions_exempt_lane_offsets_without_a_duration(folder: Path) -> None:
+    """Without `maxLateralAcc` an offset is reached at once."""
+    offset = """<PrivateAction><LateralAction><LaneOffsetAction continuous="false">
+      <LaneOffsetActionDynamics dynamicsShape="sinusoidal"{}/><LaneOffsetTarget>
+      <AbsoluteTargetLaneOffset value="1"/></LaneOffsetTarget></LaneOffsetAction></LateralAction></PrivateAction>"""
+    for limit, is_conflict in (("", False), (' maxLateralAcc="1"', True)):
+        action = f'<Action name="{{}}">{offset.format(limit)}</Action>'
+        event = f'<Event name="e" priority="parallel">{action.format("a")}{action.format("b")}</Event>'
+        assert ("conflicting-actions" in violated_rules(folder, event)) == is_conflict
+
+
 @pytest.mark.parametrize("lane", ["-1", "-01", "-2"])
 def test_unknown_lane_compares_numbers(folder: Path, lane: str) -> None:
     example = re.sub(r'(<AbsoluteTargetLane value=)"[^"]*"', rf'\1"{lane}"', EXAMPLES["unknown-lane"][1])
