@@ -176,7 +176,7 @@ def offset(target: str, continuous: str = "false", acceleration: str = 'maxLater
 STEP_ASIDE = offset('<AbsoluteTargetLaneOffset value="1"/>', acceleration="")
 
 
-@pytest.mark.parametrize("in_init", [False, True])
+@pytest.mark.parametrize("order_in_init", [None, 1, -1])
 @pytest.mark.parametrize(
     ("first", "second", "middle", "end"),
     [
@@ -186,11 +186,12 @@ STEP_ASIDE = offset('<AbsoluteTargetLaneOffset value="1"/>', acceleration="")
     ],
 )
 def test_later_lateral_action_starts_from_the_result_of_a_lateral_step(
-    run: Run, in_init: bool, first: str, second: str, middle: float, end: float
+    run: Run, order_in_init: int | None, first: str, second: str, middle: float, end: float
 ) -> None:
-    """From y = -1 or -6 linearly in 4 s; a step after a teleport starts from its place."""
-    steps = () if in_init else (("Ego", first), ("Ego", second))
-    played = run(4.5, *steps, driven=False, init=init_xml("Ego", first, second) if in_init else "")
+    """From y = -1 or -6 linearly in 4 s; a step after a teleport starts from its place. The order in Init is free."""
+    steps = (("Ego", first), ("Ego", second)) if order_in_init is None else ()
+    init = "" if order_in_init is None else init_xml("Ego", *(first, second)[::order_in_init])
+    played = run(4.5, *steps, driven=False, init=init)
     for time, y in ((2.0, middle), (4.0, end)):
         view = played.frames[round(time / 0.05)].view
         assert view.position[view.rows["Ego"], 1] == pytest.approx(y, abs=1e-6)

@@ -187,7 +187,7 @@ class Builder:
                 for action in private.private_action:
                     by_actor.setdefault(actor, []).extend(self._behaviours(action, actor))
         for own in by_actor.values():
-            behaviours += sorted(own, key=lambda behaviour: behaviour.moves_over_time)
+            behaviours += sorted(own, key=_phase_of_init)
         return behaviours
 
     def _story(self, story: model.Story) -> StoryNode:
@@ -346,6 +346,11 @@ class Builder:
             if self._is_built:
                 raise
             self._diagnostics += error.diagnostics
+
+
+def _phase_of_init(behaviour: ActionBehaviour) -> int:
+    """Return the order of an action of Init: state of its actor, lateral steps from there, motion over time."""
+    return behaviour.moves_over_time + (behaviour.moves_over_time and not behaviour.at_once)
 
 
 def _leaves(element: model.Element, parent: model.Element) -> Iterator[tuple[model.Element, model.Element]]:
