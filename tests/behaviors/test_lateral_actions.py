@@ -13,7 +13,15 @@ import pytest
 from opendrive_xml import lanes_xml, map_xml, road_xml
 from openscenario_xml import round_car_xml
 from recorded_scene import RunScene
-from storyboard_xml import element_state_xml, init_xml, lane_position_xml, speed_xml, teleport_xml, world_position_xml
+from storyboard_xml import (
+    element_state_xml,
+    global_xml,
+    init_xml,
+    lane_position_xml,
+    speed_xml,
+    teleport_xml,
+    world_position_xml,
+)
 from street_scene import NOTHING, OPENING, after
 from trajectories import CORNER, follow_points
 from whole_run import Run
@@ -342,6 +350,16 @@ def test_preempted_init_trajectory_is_no_longer_followed(run: Run) -> None:
     run(1, ("Ego", aside, after(0.45)), driven=False, init=init, during=look)
     assert followed[0.4]
     assert not followed[0.6]
+
+
+def test_lane_change_in_a_chain_after_a_deletion_replaces_a_trajectory(scene: RunScene) -> None:
+    """The deletion at 0.3 s stops the action of Other, and the lane change starts: 4 m in 4 s."""
+    delete = global_xml('<EntityAction entityRef="Other"><DeleteEntityAction/></EntityAction>')
+    stopped = element_state_xml("action", "action 1", "stopTransition")
+    way = follow_points([(100.0, -2.0, None), (400.0, -2.0, None)])
+    chain = (("Ego", delete, after(0.25)), ("Ego", change(lane(-2)), stopped))
+    played = scene(4.5, ("Ego", way), ("Other", speed_xml(15, 9)), *chain)
+    assert [played.at(time).y for time in (0.4, 2.3, 4.3)] == pytest.approx([-2.1, -4.0, -6.0])
 
 
 def test_lane_offset_relative_to_the_actor_itself_refers_to_its_start(scene: RunScene) -> None:

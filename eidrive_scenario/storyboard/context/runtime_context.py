@@ -143,6 +143,12 @@ class RuntimeContext(ActionContext, ControllerContext):
             ):
                 for preempted in other.linked_behaviours(behaviour):
                     self.release_domains(preempted)
+                    if preempted.controls & MOTION:
+                        # It may have decided before an action of this step changed a state.
+                        preempted.actor.motion.discard_requests(
+                            lateral=bool(preempted.controls & Domain.LATERAL),
+                            longitudinal=bool(preempted.controls & Domain.LONGITUDINAL),
+                        )
                     other.preempt(preempted, f"{holder.name} acquired its domain")
         self._holders.append((actor, domains, occupant, holder))
 

@@ -154,6 +154,13 @@ class Motion(MotionState):
         """
         self._lane_distance, self._carried, self._rests = distance, carried, False
 
+    def discard_requests(self, *, lateral: bool, longitudinal: bool) -> None:
+        """Discard requests for the current step whose action ends before the step."""
+        if lateral:
+            self._lateral_step = self._next_pose = None
+        if longitudinal:
+            self._lane_distance = None
+
     def set_reference_lane(self, lane: int) -> LaneLocation | None:
         """Refer the location to another lane of the same road. Return it with the offset from that lane."""
         here = self._location
