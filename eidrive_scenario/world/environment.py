@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
-from eidrive_scenario.world.weather import Weather
+from eidrive_scenario.world.weather import BRIGHTEST, Weather
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def weather_from_environment(environment: Environment, time: float = 0.0) -> Wea
     values: dict[str, Any] = {
         "name": environment.name,
         "friction": min(max(environment.friction, LEAST_FRICTION), 2.0),
-        "wind_direction": math.degrees(wind) if wind is not None else None,
+        "wind_direction": math.degrees(math.fmod(wind, math.tau)) if wind is not None else None,
         "wind_speed": min(environment.wind_speed, HURRICANE) if environment.wind_speed is not None else None,
         "visual_range": min(max(environment.fog_range, 1.0), CLEAR) if environment.fog_range is not None else None,
         "cloud_cover": _CLOUDS.get(environment.clouds or ""),
@@ -136,13 +136,14 @@ def _sun(environment: Environment, time: float) -> dict[str, float]:
             return {}
         azimuth, height = solar_position(moment)
         return {"sun_azimuth": azimuth, "sun_elevation": height}
+    azimuth = math.degrees(math.fmod(environment.sun_azimuth or 0.0, math.tau))
     height = math.degrees(math.remainder(elevation, 2.0 * math.pi))
     if abs(height) > 90.0:
-        height = math.copysign(180.0 - abs(height), height)
-    sun = {"sun_azimuth": math.degrees(environment.sun_azimuth or 0.0), "sun_elevation": height}
+        azimuth, height = azimuth + 180.0, math.copysign(180.0 - abs(height), height)
+    sun = {"sun_azimuth": azimuth, "sun_elevation": height}
     given = environment.illuminance
     if given is not None and given > FULL_SUN:
-        sun["sun_illuminance"] = given
+        sun["sun_illuminance"] = min(given, BRIGHTEST)
     elif given is not None:
         sun["sun_share"] = max(given, 0.0)
     return sun

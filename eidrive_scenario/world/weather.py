@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Literal
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import Field, model_validator
 
 from eidrive_scenario.errors import Diagnostic, SettingError
 from eidrive_scenario.extensions.library import resolve
@@ -39,7 +39,11 @@ DARK = 1.0
 POOR_SIGHT = 1500.0
 """Visual range below which vehicles switch on their lamps automatically [m]."""
 
+BRIGHTEST = 1e9
+"""Maximum illuminance [lx]; images compute light in single precision."""
+
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Illuminance = Annotated[float, Field(ge=0.0, le=BRIGHTEST)]
 
 
 class Weather(Settings):
@@ -64,17 +68,17 @@ class Weather(Settings):
     description: str = ""
     sun_azimuth: float = 130.0
     sun_elevation: float = Field(default=55.0, ge=-90.0, le=90.0)
-    sun_illuminance: NonNegativeFloat | None = None
+    sun_illuminance: Illuminance | None = None
     sun_share: Share = 1.0
     cloud_cover: Share = 0.1
-    visual_range: PositiveFloat = 30_000.0
+    visual_range: float = Field(default=30_000.0, ge=1e-3)
     precipitation: Literal["none", "rain", "snow"] = "none"
     precipitation_intensity: float = Field(default=0.0, ge=0.0, le=500.0)
     wetness: Share = 0.0
     friction: Annotated[float, Field(gt=0.0, le=2.0)] | None = None
     wind_direction: float = 0.0
     wind_speed: float = Field(default=0.0, ge=0.0, le=100.0)
-    street_lighting: NonNegativeFloat = 0.0
+    street_lighting: Illuminance = 0.0
     headlights: Literal["auto", "on", "off"] = "auto"
 
     @model_validator(mode="after")

@@ -135,6 +135,27 @@ def test_sun_elevation_beyond_zenith_is_on_the_opposite_side() -> None:
     assert weather_from_environment(Environment(sun_azimuth=0.0, sun_elevation=-1.1)).lamps_on
 
 
+def test_sun_beyond_zenith_shines_from_the_opposite_side() -> None:
+    """Unit vector of azimuth 0 and elevation 135 degrees: y = cos 135, z = sin 135."""
+    weather = weather_from_environment(Environment(sun_azimuth=0.0, sun_elevation=math.pi * 0.75))
+    assert weather.sun_direction == pytest.approx((0.0, -math.sqrt(0.5), math.sqrt(0.5)))
+
+
+@pytest.mark.parametrize("setting", ["visual_range: 1.0e-310", "sun_illuminance: 1.0e+39", "street_lighting: 1.0e+39"])
+def test_weather_beyond_single_precision_is_an_error(setting: str, tmp_path: Path) -> None:
+    (tmp_path / "w.yaml").write_text(setting)
+    with pytest.raises(SettingError, match=rf"w.yaml:1: setting '{setting.split(':')[0]}' is"):
+        load_weather(tmp_path / "w.yaml")
+
+
+def test_environment_of_huge_numbers_gives_finite_weather() -> None:
+    """Turns of 2 pi; 1e308 rad are not a finite number of degrees."""
+    huge = Environment(sun_azimuth=1e308, sun_elevation=0.5, illuminance=1e39, wind_direction=1e308)
+    weather = weather_from_environment(huge)
+    turn = math.degrees(math.fmod(1e308, 2.0 * math.pi))
+    assert (weather.sun_azimuth, weather.wind_direction, weather.sun_illuminance) == (turn, turn, 1e9)
+
+
 def test_solar_position_at_solstices_and_equinox() -> None:
     """At noon of a solstice at 48 degrees north the sun is 90 - 48 ± 23.45 degrees high in the south.
 
