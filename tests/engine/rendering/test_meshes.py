@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from eidrive_scenario.rendering.materials import MATERIALS, PAINTS, paint
 from eidrive_scenario.rendering.meshes import BUILDERS, actor_mesh, solids
 from eidrive_scenario.rendering.meshes.road_objects import building, road_object_mesh
 from eidrive_scenario.rendering.model import model
-from eidrive_scenario.world.actor import ActorSpec
+from eidrive_scenario.world.actor import ActorSpec, ExtraAxle
 from eidrive_scenario.world.specs import SHAPES
 
 SIZES = {
@@ -81,6 +82,25 @@ def test_each_shape_fills_its_box(shape: str) -> None:
     assert high[0] - low[0] >= 0.85 * length
     assert sum(len(triangles) for triangles in mesh.values()) < 5000
     assert all(volume(triangles) >= -1e-6 for material, triangles in mesh.items() if material == "paint")
+
+
+@pytest.mark.parametrize("shape", AXLES)
+def test_axles_far_from_the_box_are_drawn_in_it(shape: str) -> None:
+    length, _, height = SIZES[shape]
+    axles = (ExtraAxle(300.0, 1.0, 0.3),)
+    mesh = actor_mesh(replace(spec_of(shape), offset=(100.0, 0.0, height / 2), extra_axles=axles))
+    assert all(np.abs(triangles[..., 0]).max() < 0.7 * length for triangles in mesh.values())
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_body_smaller_than_its_details_fills_its_box(shape: str) -> None:
+    """At 1 : 500, as a truck of 1.7 cm; handlebars and shoes are wider than the narrowest bodies, by a factor of 3."""
+    spec = spec_of(shape)
+    size, offset = (np.array(spec.size) / 500.0).tolist(), (np.array(spec.offset) / 500.0).tolist()
+    for radius in (spec.wheel_radius / 500.0, spec.wheel_radius):
+        tiny = replace(spec, size=size, offset=offset, wheelbase=spec.wheelbase / 500.0, wheel_radius=radius)
+        points = np.concatenate([triangles.reshape(-1, 3) for triangles in actor_mesh(tiny).values()])
+        assert (np.ptp(points, axis=0) < 3.0 * np.array(size)).all()
 
 
 def test_model_of_body_of_a_micrometer_fills_its_box() -> None:
