@@ -13,6 +13,10 @@ from eidrive_scenario.base.kernels import kernel
 _LEAST = np.float32(1e-30)
 """Nearness of infinite distance; 0 means no triangle."""
 
+_NEEDLE = 1e-10
+"""Width over length of a triangle like a needle: the slopes of its nearness are rounding errors, which would place it
+in front of its nearest corner or infinitely far away."""
+
 
 class Cover(NamedTuple):
     """Visible triangles of an image.
@@ -75,6 +79,9 @@ def _draw(
         twice_area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
         rightwards = ((n1 - n0) * (y2 - y0) - (n2 - n0) * (y1 - y0)) / twice_area
         downwards = ((n2 - n0) * (x1 - x0) - (n1 - n0) * (x2 - x0)) / twice_area
+        extent = max(abs(x1 - x0), abs(x2 - x0), y2 - y0)
+        if not abs(twice_area) > _NEEDLE * extent * extent:
+            rightwards = downwards = 0.0
         start = n0 - x0 * rightwards
         along_long, along_upper, along_lower = (x2 - x0) / (y2 - y0), (x1 - x0) / (y1 - y0), (x2 - x1) / (y2 - y1)
         for line in range(top, bottom):

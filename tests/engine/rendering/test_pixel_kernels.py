@@ -9,6 +9,7 @@ import pytest
 
 from eidrive_scenario.rendering.lamps import _shine
 from eidrive_scenario.rendering.projection import CameraView
+from eidrive_scenario.rendering.rasterization import rasterize
 from eidrive_scenario.rendering.shading import _add_grain, _attenuate, _illuminate, _mix, _reflect, label_pixels
 from eidrive_scenario.rendering.shadows import Shadows, _darken
 from eidrive_scenario.rendering.surfaces import _mirror
@@ -40,6 +41,21 @@ def test_places_of_pixels_are_on_their_rays_at_their_depth() -> None:
     np.testing.assert_allclose(places[:3], expected, rtol=1e-4, atol=1e-4)
     np.testing.assert_allclose(places[3], np.linalg.norm(expected, axis=0), rtol=1e-5)
     np.testing.assert_allclose(view.directions(pixels), unit(expected.T).T, atol=1e-6)
+
+
+def test_pixels_of_a_needle_are_between_its_corners_in_depth() -> None:
+    """Triangles of a millionth of a pixel and less in width; about one in sixty contains the center of a pixel."""
+    rng = np.random.default_rng(3)
+    shares = rng.uniform(-1.0, 2.0, 20_000)
+    for share in shares:
+        begin, along = rng.uniform(0.0, 64.0, 2).round() / 2.0, rng.normal(size=2) * 10.0 ** rng.uniform(0.0, 4.0)
+        bend = begin + share * along + rng.normal(size=2) * 10.0 ** rng.uniform(-16.0, -6.0)
+        x, y = np.stack([begin, begin + along, bend], axis=1)[:, :, None]
+        nearness = rng.uniform(0.01, 10.0, (3, 1))
+        drawn = rasterize(x, y, nearness, 32, 32).nearness
+        drawn = drawn[drawn > 0.0]
+        assert (drawn <= 1.01 * nearness.max()).all()
+        assert (drawn >= 0.99 * nearness.min()).all()
 
 
 def test_share_of_the_sun_is_interpolated_between_lit_and_dark_cells() -> None:
