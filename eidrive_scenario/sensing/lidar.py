@@ -40,7 +40,8 @@ visibility; tested sensors measure bodies in it (Bijelic, Gruber, Ritter: A benc
 2018)."""
 UNEVEN = {"rain": 0.15, "snow": 0.15, "none": 4.0}
 """Shape of the gamma distribution by which the return of the air varies between rays: approximately the number of drops
-in the volume of a pulse if there are few (0.2 liters with less than a thousand drops per m³)."""
+in the volume of a pulse if there are few (0.2 liters with less than a thousand drops per m³). The variances of fog and
+drops add up in proportion to their shares of the return, squared."""
 
 
 class Returns(NamedTuple):
@@ -92,10 +93,11 @@ def returns(
     where = np.where(np.isfinite(distance), distance, 0.0)
     intensity = brightness * through * np.exp(-attenuation * where)
     false = np.zeros(len(distance), dtype=bool)
-    air = weather.extinction - weather.fog_extinction * (weather.visual_range > 10_000.0)
+    air = weather.fog_extinction * (weather.visual_range <= 10_000.0) + weather.precipitation_extinction
     if air > 0.0:
         ranges, soft = _air(round(fade, 9), round(BACKSCATTER * air / CONTRAST, 12))
-        shape = UNEVEN[weather.precipitation]
+        drops = weather.precipitation_extinction / air
+        shape = 1.0 / ((1.0 - drops) ** 2 / UNEVEN["none"] + drops**2 / UNEVEN[weather.precipitation])
         # The distance in the air is drawn by the power from there. The air is measured if it is before the surface,
         # and stronger than the surface and the minimum of the receiver.
         strength = draws.gamma(shape, 1.0 / shape, len(distance))

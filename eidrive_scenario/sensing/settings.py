@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -222,6 +223,8 @@ class LidarSettings(SensorSettings):
             raise ValueError(f"lower_fov exceeds upper_fov (got {self.lower_fov:g} and {self.upper_fov:g})")
         if self.elevations is not None and len(self.elevations) != self.channels:
             raise ValueError(f"elevations has the wrong length (got {len(self.elevations)}; expected {self.channels})")
+        if self.elevations is not None and any(low > high for high, low in pairwise(self.elevations)):
+            raise ValueError(f"elevations rise (got {list(self.elevations)}; expected the highest ring first)")
         rays = max(self.points_per_second / self.rotation, self.points_per_second / (self.rate or math.inf))
         if rays > MAX_RAYS:
             raise ValueError(

@@ -204,6 +204,26 @@ def test_rain_causes_false_returns_and_clear_air_none() -> None:
     assert 0.0 < share(drizzle) < 0.04 < share(downpour) < 0.3
 
 
+@pytest.mark.parametrize("rate", [0.0, 0.01])
+def test_traces_of_rain_hardly_change_returns_of_fog(rate: float) -> None:
+    """0.01 mm/h attenuate by 0.05 dB/km, and fog of 200 m by 85 dB/km."""
+
+    def share(weather: Weather) -> float:
+        back = returns(
+            np.full(20_000, np.inf),
+            np.zeros(20_000),
+            weather,
+            attenuation=0.0,
+            ten_percent_range=150.0,
+            draws=np.random.default_rng(7),
+        )
+        return float(back.detected.mean())
+
+    fog = Weather(visual_range=200.0)
+    rain = Weather(visual_range=200.0, precipitation="rain", precipitation_intensity=rate)
+    assert share(rain) == pytest.approx(share(fog), abs=0.003)
+
+
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     "weather", [Weather(visual_range=1e-3), Weather(precipitation="snow", precipitation_intensity=1e-9)]
@@ -275,6 +295,7 @@ def test_mirrored_scene_returns_mirrored_points(boxes: Any) -> None:
     [
         ({"channels": 0}, "greater than or equal to 1"),
         ({"channels": 3, "elevations": [1, 2]}, r"elevations has the wrong length \(got 2; expected 3"),
+        ({"channels": 3, "elevations": [1, 2, 0]}, "elevations rise"),
         ({"channels": 64, "points_per_second": 100}, "less than one column"),
         ({"range": -1}, "greater than 0"),
         ({"dropoff": 1.0}, "less than 1"),
