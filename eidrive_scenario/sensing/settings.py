@@ -15,7 +15,7 @@ Rate = Annotated[float, Field(ge=0.01, le=10_000.0)]
 MAX_RANGE = 1e5
 """Maximum range of a sensor [m]."""
 MAX_RAYS = 2_000_000
-"""Maximum number of rays of one reading: of a lidar revolution, or between two readings."""
+"""Maximum number of rays of a lidar revolution, which is the maximum of a reading."""
 MAX_PIXELS = 32_000_000
 """Maximum number of computed pixels of one image, including supersampling."""
 
@@ -225,7 +225,7 @@ class LidarSettings(SensorSettings):
             raise ValueError(f"elevations has the wrong length (got {len(self.elevations)}; expected {self.channels})")
         if self.elevations is not None and any(low > high for high, low in pairwise(self.elevations)):
             raise ValueError(f"elevations rise (got {list(self.elevations)}; expected the highest ring first)")
-        rays = max(self.points_per_second / self.rotation, self.points_per_second / (self.rate or math.inf))
+        rays = self.points_per_second / self.rotation
         if rays > MAX_RAYS:
             raise ValueError(
                 f"points_per_second gives too many rays in one reading (got {rays:.3g}; expected at most {MAX_RAYS})"

@@ -84,6 +84,13 @@ def test_directions_continue_rotation_between_readings(boxes: Any) -> None:
     np.testing.assert_allclose(np.sort(np.rint(turns) % 360), np.arange(360))
 
 
+def test_reading_after_many_revolutions_has_the_rays_of_one(boxes: Any) -> None:
+    """2,600,000 rays per second at 10 revolutions per second are 260,000 rays per revolution, also if read at 1 Hz."""
+    settings = LidarSettings(channels=128, points_per_second=2_600_000, rotation=10.0, rate=1.0)
+    lidar = Lidar(settings, boxes.spec("Ego"))
+    assert [len(lidar.directions(time)) for time in (0.0, 1.0)] == [2031 * 128] * 2
+
+
 def test_intensity_is_reflectivity_times_cosine_times_attenuation(boxes: Any) -> None:
     view = ego_and(boxes, Car=(20.0, 0.0, 0.6))
     scene = boxes.scene(view, ground=True)
@@ -297,6 +304,7 @@ def test_mirrored_scene_returns_mirrored_points(boxes: Any) -> None:
         ({"channels": 3, "elevations": [1, 2]}, r"elevations has the wrong length \(got 2; expected 3"),
         ({"channels": 3, "elevations": [1, 2, 0]}, "elevations rise"),
         ({"channels": 64, "points_per_second": 100}, "less than one column"),
+        ({"points_per_second": 2_000_100, "rotation": 1.0}, "too many rays"),
         ({"range": -1}, "greater than 0"),
         ({"dropoff": 1.0}, "less than 1"),
     ],
