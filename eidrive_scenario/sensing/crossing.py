@@ -14,7 +14,10 @@ from eidrive_scenario.world.view import WorldView
 Point = tuple[float, float, float]
 
 BEYOND_OWN_BODY = 1e-3
-"""Offset of the start of a ray behind the ego body, as a share of its length."""
+"""Offset of the start of a ray behind the ego body, as a share of its length. A ray through the underside starts before
+it, as the road there, such as a bridge, hides what is below."""
+ROUNDING = 1e-9
+"""Relative tolerance of the height at which a ray leaves through the underside."""
 PARALLEL = 1e-12
 """Minimum extent of a ray across a slab [m]; shorter ones are replaced by it."""
 
@@ -69,7 +72,11 @@ def shares_behind(origins: Array, targets: Array, boxes: Array) -> Array:
     """Return the shares (P, K) of rays (P, K, 3) at which they leave upright boxes (P, 7); 0 without intersection."""
     enter, leave = crossing(origins, targets, boxes)
     crosses = (enter < leave) & (leave > 0.0) & (enter < 1.0)
-    return np.where(crosses, np.minimum(leave + BEYOND_OWN_BODY, 1.0), 0.0)
+    fall = origins[..., 2] - targets[..., 2]
+    above_bottom = origins[..., 2] - boxes[:, None, 2] + boxes[:, None, 5] / 2.0
+    through_bottom = (fall > 0.0) & (leave * fall >= above_bottom * (1.0 - ROUNDING))
+    starts = np.where(through_bottom, np.maximum(leave - BEYOND_OWN_BODY, 0.0), leave + BEYOND_OWN_BODY)
+    return np.where(crosses, np.minimum(starts, 1.0), 0.0)
 
 
 def few_ray_starts(origin: Point, targets: Sequence[Point], box: Sequence[float]) -> list[Point]:
@@ -107,6 +114,7 @@ def few_ray_starts(origin: Point, targets: Sequence[Point], box: Sequence[float]
         if enter >= leave or leave <= 0.0 or enter >= 1.0:
             starts.append(origin)
         else:
-            share = min(leave + BEYOND_OWN_BODY, 1.0)
+            through_bottom = dz < 0.0 and leave * dz <= bottom * (1.0 - ROUNDING)
+            share = min(max(leave - BEYOND_OWN_BODY, 0.0) if through_bottom else leave + BEYOND_OWN_BODY, 1.0)
             starts.append((ox + share * dx, oy + share * dy, oz + share * dz))
     return starts

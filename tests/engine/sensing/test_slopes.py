@@ -15,6 +15,7 @@ from eidrive_scenario.base.geometry import rotation_matrix
 from eidrive_scenario.roads import RoadNetwork
 from eidrive_scenario.sensing.rig import Rig
 from eidrive_scenario.sensing.settings import LidarSettings, TruthSettings
+from eidrive_scenario.sensing.truth import TruthSensor, few_visibilities, visibilities
 from eidrive_scenario.world import World
 from eidrive_scenario.world.actor import ActorSpec, Placement
 
@@ -84,3 +85,17 @@ def test_rays_near_the_own_body_are_not_lost(roads: RoadNetwork) -> None:
             ranges.append(np.linalg.norm(cloud.points[near & backward], axis=1))
     assert len(ranges[0]) == len(ranges[1]) > 2
     assert np.sort(ranges[0]) == pytest.approx(np.sort(ranges[1]), abs=0.02)
+
+
+def test_truth_sensor_on_a_bridge_does_not_detect_a_car_below_it() -> None:
+    """A bridge along y at a height of 6 m, 7 m wide: the lines from 7.9 m to the car below cross it at |x| < 3.2 m."""
+    roads = road_xml(x=-50.0), road_xml("2", y=-50.0, hdg=math.pi / 2.0, profiles=elevation_xml(6.0))
+    network = RoadNetwork.parse(map_xml(*roads))
+    with World(network) as world:
+        for name, road, s in (("Ego", "2", 45.0), ("Car", "1", 53.0)):
+            pose = network.lane_pose_at(road, -1, s)
+            world.add(dataclasses.replace(CAR, name=name), Placement(pose.x, pose.y, pose.z, pose.h))
+        view = world.view()
+        truth = TruthSensor(TruthSettings(), world.spec("Ego"))
+        assert few_visibilities([truth], [0], [[1]], world, view) == [0.0]
+        assert visibilities([truth], [0], [[1]], world, view) == [0.0]
