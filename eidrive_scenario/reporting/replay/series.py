@@ -115,7 +115,8 @@ class SeriesBuilder:
         return {"time": round(time, 4), "text": f"smallest gap of {pair}: {gap:.2f} m"}
 
     def _note_contact(self, frame: Frame, driven: list[str]) -> None:
-        self._driven |= bool(driven)
+        if driven and not self._driven:
+            self._driven, self._contact, self._least = True, None, (math.inf, 0.0, "")
         for contact in frame.view.contacts if self._contact is None else ():
             trains = {*driven}.union(*map(frame.attached, driven))
             if not self._driven or contact.first in trains or contact.second in trains:

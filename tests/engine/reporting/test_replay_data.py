@@ -310,6 +310,21 @@ def test_contacts_of_all_actors_have_impact_speed(street: Play) -> None:
     assert data["contact"] == {"time": 3.0, "text": "contact of Ego and Truck"}
 
 
+def test_instants_before_the_first_driven_vehicle_are_not_decisive() -> None:
+    """Lead touches Last after 0.1 s and is 1 m beside Last later; Ego joins after 0.3 s and stands 20 m behind Lead."""
+    bodies = {
+        name: {"position": (x, y, 0.0), "velocity": (2.0, 0.0, 0.0)}
+        for name, x, y in (("Lead", 24.0, 0.0), ("Last", 24.0, 3.0))
+    }
+    frames = [Frame(view(bodies, tick)) for tick in range(3)]
+    frames[1] = replace(
+        frames[1], view=replace(frames[1].view, contacts=(Contact("Lead", "Last", (0.0, 0.0, 0.0), 3.0),))
+    )
+    assert observe(frames).decisive == {"time": 0.1, "text": "contact of Lead and Last at 3.0 m/s"}
+    joined = Frame(view({**bodies, "Ego": {"velocity": (2.0, 0.0, 0.0)}}, 3), {"Ego": step(detected(0.3, []))})
+    assert observe([*frames, joined]).decisive == {"time": 0.3, "text": "smallest gap of Ego and Lead: 20.00 m"}
+
+
 def test_overlay_has_lost_messages_and_plans_without_boxes(street: Play) -> None:
     data = replay_data(street(1, frozenset(range(30, 40))))
     second = overlay(data)
