@@ -286,8 +286,8 @@ def replay_data(
     poses      [x, y, yaw of the box center, speed] by frame and name; also [height of the center of the bottom,
                pitch, roll] of actors that are not level at height 0
     stations   by name, for each frame: own boxes, boxes `received` by sender, `fused` boxes with the semi-axes and
-               the direction of their 95 % ellipse, links [sender, delivered], and the plan: its reason, path, whether
-               it demands braking, and the rows of the fused objects that are the reason. None: absent.
+               the direction of their 95 % ellipse, and the plan: its reason, path, whether it demands braking, and
+               the rows of the fused objects that are the reason. None: absent.
                A box is [x, y, l, w, yaw, h], with the probability of existence as seventh entry if it is estimated,
                None otherwise if more entries follow
     messages   see `MessageList`; lost  indices of those whose receiver left while they were in flight
@@ -418,7 +418,6 @@ def _station(snapshot: StationSnapshot) -> Data:
         "own": _boxes(snapshot.own),
         "received": received,
         "fused": _boxes(snapshot.fused, ellipses=True),
-        "links": [[event.sender, event.outcome == "delivered"] for event in snapshot.links],
         "plan": plan.reason if plan else "",
         "path": _path(plan),
         "braking": plan is not None and plan.braking is not None,

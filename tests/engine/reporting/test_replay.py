@@ -58,7 +58,6 @@ def test_replay_data_separates_own_and_received_boxes(street: Play) -> None:
     assert [box[:5] for box in ego["own"]] == [[25.4, 5.6, 8.47, 2.89, -1.571]]
     assert list(ego["received"]) == ["RSU"]
     assert sorted(box[:2] for box in ego["received"]["RSU"]) == [[25.4, 5.6], [29.5, 15.7]]
-    assert ego["links"] == [["RSU", True]]
     assert ego["plan"] == "conflict area"
 
 

@@ -5,7 +5,7 @@ const page = JSON.parse(element("data").textContent);
 const table = (entries) => Object.assign(Object.create(null), entries);
 /* Return a run without frames; `addPart` appends frames. */
 const newRun = () => ({ times: [], ticks: [], actors: table(), poses: table(), stations: table(), changes: [], messages: [],
-                        timeline: [], series: table(), models: {}, light: [], contacts: [], contact: null, decisive: null });
+                        timeline: [], series: table(), models: {}, light: [], contacts: [], decisive: null });
 /* The run of the page, and the run that is shown over it; null without one. */
 const data = Object.assign(newRun(), { roads: page.roads, street: page.street, colors: page.colors, images: table(page.images) });
 const other = page.other ? newRun() : null;
@@ -67,7 +67,6 @@ function addPart(part, run = data) {
     const known = run.timeline.findIndex(([path]) => path === row[0]);
     if (known < 0) run.timeline.push(row); else run.timeline[known] = row;
   }
-  run.contact = part.contact;
   run.decisive = part.decisive;
   last = data.times.length - 1;
   duration = last < 0 ? 0 : data.times[last] - data.times[0];
