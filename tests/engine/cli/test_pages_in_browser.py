@@ -6,6 +6,7 @@ EIDRIVE_SCREENSHOTS names a folder for pictures of the pages.
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import sys
@@ -20,12 +21,16 @@ import cv2
 import numpy as np
 import pytest
 from command_fixtures import Eidrive
+from opendrive_xml import map_xml, road_xml
+from written_recording import detected, step, write_run
+from written_recording import view as world_view
 
 from eidrive_scenario.experiments.single_run import run_and_save
 from eidrive_scenario.extensions.library import resolve_scenario
 from eidrive_scenario.recording.frame import Frame
 from eidrive_scenario.recording.recording import read_recording
 from eidrive_scenario.reporting.live.live_view import LiveView
+from eidrive_scenario.reporting.replay.page import make_replay
 from eidrive_scenario.reporting.run_report.report import write_run_report
 
 BROWSER = os.environ.get("EIDRIVE_BROWSER")
@@ -402,8 +407,61 @@ def test_replay_without_webgl_keeps_the_drawing_in_perspective(browser: Any, rep
     assert views == ["top", "follow", "third", "driver"]
     page.page.select_option("#view", "third")
     assert colors(page) > 1000
+    page.page.keyboard.press("5")  # that of the orbit
+    assert page.page.evaluate("[shown.view, element('view').value]") == ["third", "third"]
     page.faults = [fault for fault in page.faults if "WebGL" not in fault]  # three.js reports the missing context
     page.close("replay-without-webgl", full=False)
+
+
+def test_replay_without_actors_shows_the_road_of_hundred_meters(browser: Any, tmp_path: Path) -> None:
+    road = tmp_path / "road.xodr"
+    road.write_text(map_xml(road_xml(length=100.0)))
+    run = write_run(tmp_path, [Frame(world_view({}))], road=road)
+    make_replay(run.recording, tmp_path / "empty.html")
+    page = Page(browser, tmp_path / "empty.html", 1440)
+    x, scale, width = page.page.evaluate("[topView.x, topView.scale, canvas.offsetWidth]")
+    assert (x, scale) == (50.0, pytest.approx(width / (100.0 + 16.0)))
+    page.close("replay-without-actors")
+
+
+def test_charts_show_a_single_value_as_a_point(browser: Any, tmp_path: Path) -> None:
+    """The speed 5 m/s is at the upper edge of its chart, 6 pixels below that of the picture."""
+    run = write_run(
+        tmp_path, [Frame(world_view({"Ego": {"velocity": (5.0, 0.0, 0.0)}}), {"Ego": step(detected(0.0, []))})]
+    )
+    make_replay(run.recording, tmp_path / "frame.html")
+    page = Page(browser, tmp_path / "frame.html", 1440)
+    assert page.page.evaluate("document.querySelector('.chart path').isPointInStroke(new DOMPoint(0, 6))")
+    page.close("replay-of-one-frame")
+
+
+def test_sensor_ranges_of_a_station_stay_when_another_leaves(browser: Any, tmp_path: Path) -> None:
+    """The ranges of 20 and 30 m are circles with diameters of 40 and 60 m."""
+    truth = {"truth": {"kind": "truth", "range": 20.0}}
+    both = truth | {"lidar": {"kind": "lidar", "range": 30.0}}
+    stations = {"First": {"detector": "oracle", "sensors": truth}, "Second": {"detector": "oracle", "sensors": both}}
+    bodies = {name: {"position": (10.0 * number, 0.0, 0.0)} for number, name in enumerate(stations)}
+    frames = [
+        Frame(world_view(present, tick), {name: step(detected(0.1 * tick, [])) for name in present})
+        for tick, present in enumerate([bodies, {"Second": bodies["Second"]}])
+    ]
+    run = write_run(tmp_path, frames, metadata={"settings": json.dumps({"stations": stations})})
+    make_replay(run.recording, tmp_path / "leaving.html")
+    page = Page(browser, tmp_path / "leaving.html", 1440, address="#t=0")
+    page.page.select_option("#station", "")
+    page.page.select_option("#view", "orbit")
+    page.wait("space.state === 'ready' && space.sectors.size === 3")
+    page.page.keyboard.press("ArrowRight")
+    page.wait("space.sectors.size === 2")
+    diameters = """[...space.sectors.values()].map(({ children: [, { geometry }] }) => {
+      const { array } = geometry.attributes.position;
+      let most = 0;
+      for (let i = 0; i < array.length; i += 3)
+        most = Math.max(most, Math.hypot(array[i] - array[0], array[i + 1] - array[1]));
+      return Math.round(most);
+    })"""
+    assert sorted(page.page.evaluate(diameters)) == [40, 60]
+    page.close("replay-of-leaving-station", full=False)
 
 
 SCRUB = """async () => {
@@ -742,10 +800,12 @@ def test_live_view_fills_and_becomes_the_replay(browser: Any, eidrive: Eidrive, 
         assert not late.wide()
         late.page.locator("#slider").fill("5")
         assert not late.page.is_checked("#at-end")
+        late.page.evaluate("messageList.scrollTop = 700")
         first.opened.set()
         for each, instant in ((page, 5.0), (late, 0.25)):
             each.wait("last === 100 && grownTo === 100")
             each.wait(f"shown.time === {instant}")
+        assert late.page.evaluate("[Number(element('slider').max), messageList.scrollTop]") == [100, 700]
         late.page.locator("h1").click()
         late.page.keyboard.press("End")
         assert late.page.is_checked("#at-end")

@@ -61,12 +61,13 @@ function drawChart({ title, unit, lines, limit, floor }, parent) {
     draws("text", { x: -7, y: y(level) + 4, class: "tick" }, picture).textContent = String(Number(level.toPrecision(3)));
   }
   for (const { run, color, values: column } of lines) {
-    const line = draws("path", { fill: "none", stroke: color, "stroke-width": 1.8, "stroke-linejoin": "round", ...(run === other ? { "stroke-dasharray": "5 3" } : {}) }, picture);
+    const line = draws("path", { fill: "none", stroke: color, "stroke-width": 1.8, "stroke-linejoin": "round", ...(run === other ? { "stroke-dasharray": "5 3" } : { "stroke-linecap": "round" }) }, picture);
     redraws.push(() => {
       let path = "", open = false;
       column.forEach((v, i) => {
         if (v === null) { open = false; return; }
-        path += `${open ? "L" : "M"}${(width * shareOf(run.times[i])).toFixed(1)} ${y(v).toFixed(1)}`;
+        // A line of length 0 is a point, for a value without neighbors
+        path += `${open ? "L" : "M"}${(width * shareOf(run.times[i])).toFixed(1)} ${y(v).toFixed(1)}${open ? "" : "h0"}`;
         open = true;
       });
       line.setAttribute("d", path);

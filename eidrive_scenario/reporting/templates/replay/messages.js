@@ -1,5 +1,5 @@
 /* Table of the messages of the shown station, which follows the cursor. Only the rows in view exist. */
-let listedMessages = [], currentMessage = -1, drawnRows = "";
+let listedMessages = [], currentMessage = null, drawnRows = "", laidMessages = "";
 const messageList = element("message-list");
 
 /* Return the columns of a message: time, link, size, delay, outcome, content. */
@@ -17,7 +17,9 @@ function layMessages() {
   element("message-panel").hidden = !data.messages.length;
   element("message-count").textContent = `${ofStation.length} messages, ${lost.length} lost`;
   listedMessages = element("lost-only").checked ? lost : ofStation;
-  currentMessage = -1;
+  // New messages of a run in progress do not move the table
+  const layout = JSON.stringify([shown.station, element("lost-only").checked, rowHeight()]);
+  if (layout !== laidMessages) [laidMessages, currentMessage] = [layout, null];
   drawnRows = "";
   followMessages();
 }

@@ -37,10 +37,14 @@ function fromAddress() {
   return match ? Number(match[1]) : null;
 }
 
-let panelState = "";
-function showPanels() {
+function showSlider() {
   element("slider").max = instants.length - 1;
   element("slider").value = indexAt(shown.time, instants);
+}
+
+let panelState = "";
+function showPanels() {
+  showSlider();
   element("clock").textContent = shown.time.toFixed(2) + " s";
   const { station } = shown, state = JSON.stringify([element("slider").value, shown.index, station]);
   followMessages();
@@ -176,6 +180,7 @@ function grow() {
   if (!shown.station && stations.length && !hasChosen) selectStation(stations[0]);
   document.querySelector(".stations").hidden = !stations.length;
   addChanges();
+  showSlider();
   showDecisive();
   layLayers();
   layTime();
@@ -253,7 +258,7 @@ const KEYS = {
   f: () => { follow(!topView.follow); draw(); },
 };
 ["top", "follow", "third", "driver", "orbit"].forEach((view, i) => {
-  KEYS[String(i + 1)] = () => { if (shown.station || !needsStation(view)) selectView(view); };
+  KEYS[String(i + 1)] = () => { if ([...element("view").options].some(({ value, disabled }) => value === view && !disabled)) selectView(view); };
 });
 
 addEventListener("keydown", (event) => {

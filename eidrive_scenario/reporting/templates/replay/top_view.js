@@ -19,6 +19,11 @@ function fit() {
     if (!pose || (center && Math.hypot(pose[0] - center[0], pose[1] - center[1]) > NEAR)) continue;
     left = Math.min(left, pose[0]); right = Math.max(right, pose[0]); bottom = Math.min(bottom, pose[1]); top = Math.max(top, pose[1]);
   }
+  // Without actors the roads are shown
+  if (left > right) for (const { area } of levels.flatMap(({ lanes }) => lanes)) {
+    left = Math.min(left, area[0]); right = Math.max(right, area[2]); bottom = Math.min(bottom, area[1]); top = Math.max(top, area[3]);
+  }
+  if (left > right) return;
   const area = canvas.getBoundingClientRect();
   topView.x = (left + right) / 2; topView.y = (bottom + top) / 2;
   topView.scale = Math.min(area.width / (right - left + 16), area.height / (top - bottom + 16));

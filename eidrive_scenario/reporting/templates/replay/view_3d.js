@@ -344,27 +344,27 @@ function drawPlan() {
   path.material.color.set(part("braking") ? C.braking : C.plan);
 }
 
-/* Yield station and outline of each sensor of the shown station, or without one of all: points in the frame of the actor. */
+/* Yield station, number and outline of each sensor of the shown station, or without one of all: points in the frame of the
+   actor. */
 function* sectorsShown() {
   if (!shown.layers.sensors) return;
   for (const name of shown.station ? [shown.station] : stations) {
     if (!data.actors[name] || !poseOf(name)) continue;
-    for (const [, , x, y, , yaw, , angle, range] of data.actors[name].sensors || []) {
+    for (const [number, [, , x, y, , yaw, , angle, range]] of (data.actors[name].sensors || []).entries()) {
       const steps = Math.max(2, Math.ceil(angle / 0.1)), isWhole = angle > 6.28, points = isWhole ? [] : [[x, y]];
       for (let i = 0; i <= steps; i += 1) {
         const turn = yaw + angle * (i / steps - 0.5), away = range || UNLIMITED;
         points.push([x + away * Math.cos(turn), y + away * Math.sin(turn)]);
       }
-      yield { name, points };
+      yield { name, number, points };
     }
   }
 }
 
 function placeSectors() {
   const { three: THREE, scene, sectors, origin: [ox, oy] } = space, present = new Set();
-  let number = 0;
-  for (const { name, points } of sectorsShown()) {
-    const key = name + "\n" + number++, pose = poseOf(name);
+  for (const { name, number, points } of sectorsShown()) {
+    const key = name + "\n" + number, pose = poseOf(name);
     present.add(key);
     if (!sectors.has(key)) {
       const group = new THREE.Group(), outline = points.map(([x, y]) => new THREE.Vector2(x, y));
