@@ -50,8 +50,7 @@ def add_topics(recording: str | os.PathLike[str], topics: Iterable[str] = ALL_TO
     """
     chosen = check_topics(topics)
     run = open_run(path_argument(recording, "recording"))
-    # A link would be written directly, while it is read
-    write_with_topics(run, run.recording.path.resolve(), chosen)
+    write_with_topics(run, run.recording.path, chosen)
     return tuple(dict.fromkeys(run.warnings))
 
 

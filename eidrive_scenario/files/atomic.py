@@ -139,16 +139,17 @@ def atomic_output(path: Path) -> Iterator[Path]:
 
     After an error or an interruption the file keeps the partial name, so that it is not mistaken for a complete run;
     after invalid input it is removed. Errors of the file state the final name. Two runs never write the same file at
-    the same time. A path that is not a regular file, such as /dev/stdout, is written directly. Raise OutputError if the
-    path is a folder, or if another run writes there.
+    the same time. A link stays, and its target is written in this way. A path that is not a regular file, such as
+    /dev/stdout, is written directly. Raise OutputError if the path is a folder, or if another run writes there.
     """
     if os.path.isdir(path):
         raise OutputError(Diagnostic("cannot write: Is a directory", "choose another place", str(path)))
-    if os.path.islink(path) or (os.path.exists(path) and not os.path.isfile(path)):
+    target = _target(path)
+    if os.path.islink(target) or (os.path.exists(target) and not os.path.isfile(target)):
         yield path
         return
-    unfinished = partial_path(path)
-    with exclusive(path):
+    unfinished = partial_path(target)
+    with exclusive(target):
         try:
             yield unfinished
         except InputError as error:
@@ -163,7 +164,13 @@ def atomic_output(path: Path) -> Iterator[Path]:
             if error.filename == str(unfinished):
                 error.filename = str(path)
             raise
-        unfinished.replace(path)
+        unfinished.replace(target)
+
+
+def _target(path: Path) -> Path:
+    """Return the file to which a link leads; the path itself if it is none, or leads to an open file."""
+    is_open_file = standard_stream(path) is not None or os.path.realpath(path.parent).startswith("/proc/")
+    return Path(os.path.realpath(path)) if os.path.islink(path) and not is_open_file else path
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from openscenario_xml import road_file_xml
 
 from eidrive_scenario.cli.options import check_output_paths
 from eidrive_scenario.errors import SettingError
-from eidrive_scenario.files.atomic import atomic_output
+from eidrive_scenario.files.atomic import atomic_output, write_atomically
 
 CATALOGS = Path(__file__).parents[2] / "data" / "catalogs"
 CATALOG_LOCATIONS = """<CatalogLocations>
@@ -189,3 +189,16 @@ def test_error_of_a_file_that_is_written_states_its_final_name(eidrive: Eidrive,
     with pytest.raises(OSError, match="full") as caught, atomic_output(tmp_path / "b.csv") as unfinished:
         raise OSError(errno.ENOSPC, "full", str(unfinished))
     assert caught.value.filename == str(tmp_path / "b.csv")
+
+
+def test_aborted_file_behind_a_link_is_unchanged(tmp_path: Path) -> None:
+    target, link = tmp_path / "kept" / "page.html", tmp_path / "page.html"
+    target.parent.mkdir()
+    target.write_bytes(b"before")
+    link.symlink_to(target)
+    with pytest.raises(TypeError), write_atomically(link) as stream:
+        stream.writelines([b"half", None])  # type: ignore[list-item]
+    assert (target.read_bytes(), [*target.parent.iterdir()]) == (b"before", [target])
+    with write_atomically(link) as stream:
+        stream.write(b"after")
+    assert (target.read_bytes(), link.is_symlink()) == (b"after", True)
