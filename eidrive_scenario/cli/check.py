@@ -49,19 +49,23 @@ def check(
     """
     from eidrive_scenario.checks.scenario_checks import DistributionCheckReport
 
+    # Only the child process knows the file and the diagnostics before it
     in_progress: list[Path] = []
+    aborted: list[str] = []
+    printed: dict[str, dict[Diagnostic, None]] = {"error": {}, "warning": {}, "note": {}}
 
     def report_hang(error: WallLimitError) -> None:
-        print_error(error, "check", *in_progress)  # only the child process knows the file
+        print_error(error, "check", *in_progress)
+        if sarif is not None:
+            _write_sarif(sarif, printed, [*aborted, ": ".join(map(str, (*in_progress, error)))])
 
     if wall_limit is not None:
         check_seconds("--wall-limit", wall_limit)
         supervise(wall_limit, report_hang, what="check")
     missing: list[Diagnostic] = []
-    aborted: list[str] = []
     files, ignored = list(_files(paths, missing)), tuple(ignore or ())
     check_output_paths({"--sarif": sarif}, files)
-    printed: dict[str, dict[Diagnostic, None]] = {"error": dict.fromkeys(missing), "warning": {}, "note": {}}
+    printed["error"].update(dict.fromkeys(missing))
     for diagnostic in missing:
         echo(str(diagnostic))
     for path in files:

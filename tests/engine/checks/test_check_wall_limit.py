@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -72,11 +73,14 @@ def test_check_hanging_extension_is_reported_and_other_files_checked(folder: Pat
 @pytest.mark.exhaustive
 def test_check_hanging_native_code_exits_with_3(folder: Path) -> None:
     write_scenario(folder / "hangs.xosc", detector="hangs_in_c_when_built")
-    code, _, err = check(folder, "hangs.xosc", "--wall-limit", "6")
+    code, _, err = check(folder, "hangs.xosc", "--wall-limit", "6", "--sarif", "check.sarif")
     assert code == 3
     detector = f"{folder / 'faulty.py'}:{line_of('in __init__')}: detector 'hangs_in_c_when_built'"
     assert err.startswith("check aborted: ")
     assert f"{detector} (faulty:HangsInCWhenBuilt): still running in __init__ after 6 s of wall time" in err
+    (invocation,) = json.loads((folder / "check.sarif").read_text())["runs"][0]["invocations"]
+    (aborted,) = invocation["toolExecutionNotifications"]
+    assert (invocation["executionSuccessful"], "still running" in aborted["message"]["text"]) == (False, True)
 
 
 @pytest.mark.exhaustive
