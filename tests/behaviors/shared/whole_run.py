@@ -101,7 +101,7 @@ class Run:
         return record
 
 
-def slope(values: list[float], start: float, end: float, dt: float = 0.05) -> float:
+def slope(values: list[float], start: float, end: float) -> float:
     """Mean change per second between two times."""
-    first, last = round(start / dt), round(end / dt)
+    first, last = round(start / 0.05), round(end / 0.05)
     return (values[last] - values[first]) / (end - start)

@@ -34,10 +34,10 @@ SCENES = {
 NUMBER = r"[-+]?[\d.]+"
 
 
-def scale(node: Node, *names: str, by: float = -1.0) -> None:
+def negate(node: Node, *names: str) -> None:
     for name in names:
         if node.get(name) is not None:
-            node.set(name, repr(by * float(node.attrib[name])))
+            node.set(name, repr(-float(node.attrib[name])))
 
 
 def negate_lane(node: Node, *names: str) -> None:
@@ -48,13 +48,13 @@ def negate_lane(node: Node, *names: str) -> None:
 
 def mirror_road(road: Node) -> None:
     for node in road.iter("geometry"):
-        scale(node, "y", "hdg")
+        negate(node, "y", "hdg")
     for node in road.iter("arc", "spiral"):
-        scale(node, "curvature", "curvStart", "curvEnd")
+        negate(node, "curvature", "curvStart", "curvEnd")
     for node in road.iter("laneOffset"):
-        scale(node, "a", "b", "c", "d")
+        negate(node, "a", "b", "c", "d")
     for node in road.iter("object", "cornerRoad", "signal"):
-        scale(node, "t", "hdg", "hOffset")
+        negate(node, "t", "hdg", "hOffset")
     for node in road.iter("validity"):
         negate_lane(node, "fromLane", "toLane")
         first, last = node.attrib["fromLane"], node.attrib["toLane"]

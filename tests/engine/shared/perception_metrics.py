@@ -17,6 +17,8 @@ from eidrive_scenario.recording.frame import Frame
 
 SIGHTED = 2.0
 """Maximum distance between the centers of an object and of a detection of a station that sees it [m]."""
+FARTHEST = 4.0
+"""Maximum distance between the centers of an object and of its detection, for the position error [m]."""
 
 
 @dataclass(frozen=True)
@@ -99,16 +101,16 @@ def recall_by_sight(samples: Iterable[MetricSample], min_iou: float) -> Recall:
     return Recall(own, others, neither)
 
 
-def position_error(samples: Iterable[MetricSample], max_distance: float = 4.0) -> float:
+def position_error(samples: Iterable[MetricSample]) -> float:
     """Return the root mean square distance between the centers of objects and of their detections, from above [m].
 
-    Objects and detections are paired in order of increasing distance, up to `max_distance` [m]. An association by
+    Objects and detections are paired in order of increasing distance, up to FARTHEST. An association by
     overlap would exclude large errors. The result is NaN without pairs.
     """
     squares = [
         distance**2
         for sample in samples
-        for _, _, distance in nearest_pairs(sample.detections.boxes, sample.objects, max_distance)
+        for _, _, distance in nearest_pairs(sample.detections.boxes, sample.objects, FARTHEST)
     ]
     return float(np.sqrt(np.mean(squares))) if squares else float("nan")
 

@@ -41,7 +41,6 @@ def exchange(
     speed: float = 0.0,
     sizes: Sequence[int] = (300,),
     sight: Any = None,
-    per_tick: int = 1,
     dt: float = DT,
 ) -> tuple[list[LinkEvent], list[tuple[str, float, ReceivedMessage]]]:
     """Send one message per station and tick, in the order of `places`, which move along x.
@@ -57,9 +56,7 @@ def exchange(
         for receiver in places:
             deliveries += [(receiver, now, received) for received in carrier.deliver(receiver, now)]
         outbox = [
-            (message(name, tick * per_tick + part, now, sizes[tick % len(sizes)]), [n for n in places if n != name])
-            for name in places
-            for part in range(per_tick)
+            (message(name, tick, now, sizes[tick % len(sizes)]), [n for n in places if n != name]) for name in places
         ]
         events += carrier.transmit(outbox, now)
     return events, deliveries

@@ -16,8 +16,8 @@ SIGNAL = (
 )
 
 
-def light(name: str, s: float, *, orientation: str = "+", t: float = -4.5) -> str:
-    return SIGNAL.format(s=s, t=t, id=name, dynamic="yes", orientation=orientation, z=2.5, type="1000001")
+def light(name: str, s: float, *, orientation: str = "+") -> str:
+    return SIGNAL.format(s=s, t=-4.5, id=name, dynamic="yes", orientation=orientation, z=2.5, type="1000001")
 
 
 def stop_sign(name: str, s: float) -> str:

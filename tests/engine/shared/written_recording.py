@@ -61,15 +61,14 @@ def detected(
     time: float,
     boxes: Sequence[Sequence[float]],
     velocity: Sequence[Sequence[float]] | None = None,
-    classes: Sequence[str] | None = None,
 ) -> Detections:
-    """Return detections with these boxes, of cars by default, a score of 0.9, and tracks from 1 on."""
+    """Return detections of cars with these boxes, a score of 0.9, and tracks from 1 on."""
     count = len(boxes)
     return Detections(
         time=time,
         boxes=np.array(boxes, dtype=float).reshape(count, 7),
         scores=np.full(count, 0.9),
-        classes=tuple(classes or ["car"] * count),
+        classes=("car",) * count,
         velocity=np.full((count, 2), np.nan) if velocity is None else np.array(velocity, dtype=float),
         covariance=np.full((count, 2, 2), np.nan),
         tracks=tuple(range(1, count + 1)),
