@@ -68,6 +68,8 @@ def main() -> None:
     parser.add_argument("--objects", type=int, default=10_000, help="number of objects of the generated road")
     parser.add_argument("--detector", default="oracle")
     options = parser.parse_args()
+    if options.runs <= 10:
+        parser.error("--runs must be above 10: the growth is that after the tenth run")
     seconds = options.seconds or (2.0 if options.scenario is None else 120.0)
     settings = RunSettings(time_limit=seconds, detector=options.detector)
     with tempfile.TemporaryDirectory() as name:
