@@ -3,8 +3,9 @@
 Every scenario under `EIDRIVE_CORPORA` (`EIDRIVE_MAPS` names the folder with CARLA's towns) is loaded and run to its
 end, with steps of 0.01 s, as esmini's users choose them, and with the default step; none of the scenarios has sensors.
 If `ESMINI` names the program esmini, it runs the same files immediately afterwards. The ratio of the two times is
-printed for scenarios that end by themselves in both. Loading counts on both sides. Results are printed for the suite in
-one process, and for a process of `eidrive run` for each file, which is measured, too.
+printed for scenarios that end by themselves in both. Loading counts on both sides; the steps after the first one find
+the roads of a file in memory, so compare them without loading. Results are printed for the suite in one process, and
+for a process of `eidrive run` for each file, which is measured, too.
 
     python benchmarks/bench_corpora.py [--match cut-in] [--limit 60] [--dt 0.01 0.05] [--csv FILE]
 """
