@@ -195,9 +195,10 @@ def _read_repeat(road: Road, repeat: etree._Element, element: etree._Element, co
         fallback = collector.number(element, name, 0.0)
         start = collector.number(repeat, f"{name}Start", fallback)
         end = collector.number(repeat, f"{name}End", start)
-        return start, start + (end - start) * share if share < 1.0 else end
+        begins, ends = (end if share == 1.0 else start + (end - start) * share for share in on_road)
+        return begins, ends
 
-    share = 1.0  # of the length that is on the road
+    on_road = 0.0, 1.0  # shares of the length between which it is on the road
     length, distance = collector.number(repeat, "length"), collector.number(repeat, "distance", 0.0)
     step = distance if distance > 0.0 else 1.0
     if length > MAX_REPETITIONS * step:
@@ -207,13 +208,18 @@ def _read_repeat(road: Road, repeat: etree._Element, element: etree._Element, co
     collector.spend(repeat, "positions of objects", max(length, 0.0) / step, MAX_OBJECTS)
     s = collector.number(repeat, "s", collector.number(element, "s", 0.0))
     last = s + (distance * math.floor(length / distance + EPSILON) if distance > 0.0 else length)
-    if last > road.length + BEYOND:
-        if distance > 0.0:
-            message = f"an object is repeated to s = {last:g} m of road {road.id!r}; the repetition ends with the road"
-            kind, hint = "repetitions beyond the ends of their roads", f"the road ends at {road.length:g} m"
-            collector.report_warning(repeat, MapRule.OBJECT_OFF_ROAD, kind, message, hint)
-        share = min(max(road.length - s, 0.0) / length, 1.0) if length > 0.0 else 0.0
-        length *= share
+    before, after = s < -BEYOND, last > road.length + BEYOND
+    if (before or after) and distance > 0.0:
+        place, end = (f"from s = {s:g} m", "starts") if before else (f"to s = {last:g} m", "ends")
+        message = f"an object is repeated {place} of road {road.id!r}; the repetition {end} with the road"
+        kind, hint = "repetitions beyond the ends of their roads", f"the road {end} at {0.0 if before else road.length:g} m"
+        collector.report_warning(repeat, MapRule.OBJECT_OFF_ROAD, kind, message, hint)
+    if s > road.length + BEYOND or last < -BEYOND:
+        length = distance = 0.0
+    elif (before or after) and length > 0.0:
+        skipped = distance * math.ceil(-s / distance - EPSILON) if distance > 0.0 else -s
+        on_road = max(skipped, 0.0) / length, min(max(road.length - s, 0.0) / length, 1.0)
+        s, length = s + on_road[0] * length, (on_road[1] - on_road[0]) * length
     for name in ("width", "height", "length", "radius", "t", "zOffset"):
         if max(map(abs, pair(name))) > MAX_OBJECT_SIZE:
             collector.report_error(repeat, f"<repeat> has a {name} beyond {MAX_OBJECT_SIZE:g} m", "correct it")

@@ -230,6 +230,26 @@ def test_repetition_beyond_its_road_ends_with_the_road(distance: float, expected
     assert [(str(doubt), doubt.rule) for doubt in network.map_warnings] == warned
 
 
+@pytest.mark.parametrize(
+    ("s", "distance", "expected"),
+    [
+        (-12.0, 5.0, [(3.0, -7.0), (8.0, -8.0)]),
+        (-12.0, 0.0, [(2.0, -6.8), (6.0, -7.6)]),
+        (-40.0, 5.0, []),
+        (140.0, 5.0, []),
+        (-40.0, 0.0, []),
+        (100.0, 5.0, [(100.0, -4.0)]),
+    ],
+)
+def test_repetition_is_on_its_road_only(s: float, distance: float, expected: list[tuple[float, float]]) -> None:
+    """t changes by 1 m over each 5 m of the stated length; gapless parts of 4 m have their centers between s = 0 and 8 m."""
+    repeat = f'<repeat s="{s}" length="20" distance="{distance}" tStart="-4" tEnd="-8"/>'
+    text = f'<objects><object id="1" type="barrier" s="5" t="-4" length="1" width="1">{repeat}</object></objects>'
+    network = RoadNetwork.parse(map_xml(road_xml(lanes=section(), extra=text)))
+    assert [placed.pose[:2] for placed in placed_objects(network)] == [pytest.approx(place) for place in expected]
+    assert [doubt.rule for doubt in network.map_warnings] == ["object-off-road"] * (distance > 0.0)
+
+
 @pytest.mark.parametrize("s", [10, 100_000])
 def test_first_lane_section_starts_at_zero(s: int) -> None:
     network = RoadNetwork.parse(map_xml(road_xml(lanes=section(s=s))))
