@@ -212,8 +212,10 @@ def _read_repeat(road: Road, repeat: etree._Element, element: etree._Element, co
     if (before or after) and distance > 0.0:
         place, end = (f"from s = {s:g} m", "starts") if before else (f"to s = {last:g} m", "ends")
         message = f"an object is repeated {place} of road {road.id!r}; the repetition {end} with the road"
-        kind, hint = "repetitions beyond the ends of their roads", f"the road {end} at {0.0 if before else road.length:g} m"
-        collector.report_warning(repeat, MapRule.OBJECT_OFF_ROAD, kind, message, hint)
+        hint = f"the road {end} at {0.0 if before else road.length:g} m"
+        collector.report_warning(
+            repeat, MapRule.OBJECT_OFF_ROAD, "repetitions beyond the ends of their roads", message, hint
+        )
     if s > road.length + BEYOND or last < -BEYOND:
         length = distance = 0.0
     elif (before or after) and length > 0.0:

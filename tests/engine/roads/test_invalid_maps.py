@@ -242,7 +242,7 @@ def test_repetition_beyond_its_road_ends_with_the_road(distance: float, expected
     ],
 )
 def test_repetition_is_on_its_road_only(s: float, distance: float, expected: list[tuple[float, float]]) -> None:
-    """t changes by 1 m over each 5 m of the stated length; gapless parts of 4 m have their centers between s = 0 and 8 m."""
+    """t changes by 1 m each 5 m of the stated length; gapless parts of 4 m have their centers from s = 0 to 8 m."""
     repeat = f'<repeat s="{s}" length="20" distance="{distance}" tStart="-4" tEnd="-8"/>'
     text = f'<objects><object id="1" type="barrier" s="5" t="-4" length="1" width="1">{repeat}</object></objects>'
     network = RoadNetwork.parse(map_xml(road_xml(lanes=section(), extra=text)))
