@@ -258,6 +258,11 @@ def _read(path: Path, collector: DiagnosticCollector) -> CatalogFile | None:
     version = version_of(document, collector, older=VERSIONS[0])
     if version is None:
         return None
+    # Errors of the header are warnings here, as the entries do not depend on it
+    header = DiagnosticCollector()
+    for node in document.root.iterchildren("FileHeader"):
+        Reader(document.name, version, header).read(node, model.FileHeader)
+    collector.warnings += header.errors + header.warnings
     repaired = apply_workarounds(catalog, document.name, version, collector)
     if repaired is not catalog:
         catalog, document = repaired, msgspec.structs.replace(document, read=None)

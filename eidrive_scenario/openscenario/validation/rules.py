@@ -19,6 +19,12 @@ from eidrive_scenario.openscenario.values.parameters import TYPES, fits_type
 from eidrive_scenario.openscenario.values.scalars import Version
 
 _WITHOUT_NUMBERS = (model.ParameterType.BOOLEAN, model.ParameterType.DATE_TIME, model.ParameterType.STRING)
+_WHOLE_NUMBERS = (
+    model.ParameterType.INT,
+    model.ParameterType.INTEGER,
+    model.ParameterType.UNSIGNED_INT,
+    model.ParameterType.UNSIGNED_SHORT,
+)
 _TRUTH = ("true", "false")
 """Boolean texts, which are compared case-insensitively, as Python capitalizes them."""
 
@@ -61,6 +67,12 @@ def _check_action(
     elif action.modify_action is not None and declared in _WITHOUT_NUMBERS:
         message = f"{kind} {name!r} is declared as {declared.value}, but modified as a number"
         collector.warning(message, "declare it as double", at=action)
+    elif action.modify_action is not None and declared in _WHOLE_NUMBERS:
+        for part in action.modify_action.walk():
+            change = getattr(part, "value", None)
+            if isinstance(change, float) and not change.is_integer():
+                message = f"{kind} {name!r} is declared as {declared.value}, but modified by {change:g}"
+                collector.warning(message, "a fraction of the result is kept; declare it as double", at=action)
 
 
 def _misfits(text: object, declared: model.ParameterType) -> bool:

@@ -1,3 +1,4 @@
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -168,6 +169,14 @@ def test_catalog_older_than_1_0_is_a_warning(write_catalog: Write, write_scenari
     catalog.write_text(catalog.read_text().replace('revMajor="1" revMinor="3"', 'revMajor="0" revMinor="9"'))
     warnings = load_scenario(write_scenario(reference("Drivers", "driver"))).warnings
     assert [warning.message for warning in warnings] == ["FileHeader has the version 0.9"]
+
+
+def test_invalid_header_of_a_catalog_is_a_warning(write_catalog: Write, write_scenario: Write) -> None:
+    path = write_catalog("Drivers.xosc", "Drivers", CONTROLLER.format(limit=3))
+    path.write_bytes(re.sub(rb' date="[^"]*"', b' date="2020-02-20"', path.read_bytes()))
+    (warning,) = load_scenario(write_scenario(reference("Drivers", "driver"))).warnings
+    assert "date of FileHeader is '2020-02-20', which is not a date and time" in str(warning)
+    assert warning.source == str(path)
 
 
 def test_self_referencing_catalog_entry_is_an_error(write_catalog: Write, write_scenario: Write) -> None:

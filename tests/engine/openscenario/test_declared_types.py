@@ -14,6 +14,7 @@ VARIABLES = """<VariableDeclarations>
 SET = '<GlobalAction><VariableAction variableRef="{name}"><SetAction value="{value}"/></VariableAction></GlobalAction>'
 ADD = """<GlobalAction><VariableAction variableRef="{name}"><ModifyAction><Rule><AddValue value="1"/></Rule>
 </ModifyAction></VariableAction></GlobalAction>"""
+HALVE = ADD.replace("AddValue", "MultiplyByValue").replace('"1"', '"0.5"')
 
 
 @pytest.mark.parametrize(
@@ -22,6 +23,7 @@ ADD = """<GlobalAction><VariableAction variableRef="{name}"><ModifyAction><Rule>
         ("fast", "", "variable 'speed' is declared as double, but its value is 'fast'; the value is used as a text"),
         ("1", SET.format(name="speed", value="fast"), "'speed' is declared as double, but set to 'fast'"),
         ("1", SET.format(name="count", value="1.5"), "'count' is declared as int, but set to '1.5'"),
+        ("1", HALVE.format(name="count"), "'count' is declared as int, but modified by 0.5; a fraction of the result"),
         ("1", ADD.format(name="mood"), "'mood' is declared as string, but modified as a number; declare it as double"),
     ],
 )
@@ -39,6 +41,7 @@ def test_values_of_declared_types_are_accepted() -> None:
             SET.format(name="open", value="True"),
             SET.format(name="mood", value="calm"),
             ADD.format(name="count"),
+            HALVE.format(name="speed"),
         )
     )
     assert load_scenario(scenario_xml(declarations=VARIABLES.format(speed="2.5"), init=init)).warnings == ()
