@@ -205,6 +205,29 @@ def test_later_lateral_action_starts_from_the_result_of_a_lateral_step(
         assert view.position[view.rows["Ego"], 1] == pytest.approx(y, abs=1e-6)
 
 
+def distance(axis: str, meters: float) -> str:
+    """Return a distance to Other that is reached at once."""
+    return f"""<PrivateAction><{axis}Action><{axis}DistanceAction entityRef="Other" distance="{meters}"
+      freespace="false" continuous="false"/></{axis}Action></PrivateAction>"""
+
+
+@pytest.mark.parametrize("in_init", [False, True])
+def test_distances_without_limits_apply_in_the_step_of_a_teleport(run: Run, in_init: bool) -> None:
+    """Other drives at 10 m/s from x = 150, y = -6: Ego is 20 m behind it and 3 m beside it after the first step."""
+    actions = (teleport_xml(lane_position_xml(-1, 200.0)), distance("Longitudinal", 20), distance("Lateral", 3))
+    steps = () if in_init else tuple(("Ego", action) for action in actions)
+    init = init_xml("Ego", *actions) if in_init else ""
+    view = run(0.1, *steps, driven=False, init=init, others={"Other": (-2, 150.0, 10.0)}).frames[1].view
+    assert view.position[view.rows["Ego"], :2].tolist() == pytest.approx([130.5, -3.0])
+
+
+def test_lateral_step_between_teleport_and_lane_change_starts_from_its_place(scene: RunScene) -> None:
+    """The three actions start together: 1 m left of lane -2, from there linearly to lane -1."""
+    steps = (teleport_xml(lane_position_xml(-2, 100.0)), STEP_ASIDE, change(lane(-1)))
+    played = scene(4, *(("Ego", action) for action in steps))
+    assert (played.at(0.1).y, played.at(4.0).y) == pytest.approx((-5.0, -2.0))
+
+
 @pytest.mark.element("LaneOffsetAction")
 def test_lane_offset_respects_the_lateral_acceleration(scene: RunScene) -> None:
     """Cubic over 1 m at 1.5 m/s²: √(6 / 1.5) = 2 s."""

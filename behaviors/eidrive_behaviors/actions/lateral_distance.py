@@ -42,6 +42,11 @@ class LateralDistanceAction(ActionBehaviour):
     domains = Domain.LATERAL
     action: model.LateralDistanceAction
 
+    @property
+    def at_once(self) -> bool:
+        """True for a distance that is reached at once and not kept."""
+        return model.is_immediate(self.action) and not self.action.continuous and not self.actor.driven
+
     def initialise(self) -> None:
         """Reset the rate; without a displacement select the current side."""
         check_other_entity(self, self.action.entity_ref)
@@ -61,7 +66,8 @@ class LateralDistanceAction(ActionBehaviour):
         if self.actor.driven:
             warn_without_effect(self)
         check_presence(self, self.action.entity_ref)
-        if self.actor.driven or self.action.entity_ref not in self.context.view or here is None or roads is None:
+        is_other_present = self.context.actors[self.action.entity_ref].present
+        if self.actor.driven or not is_other_present or here is None or roads is None:
             return Status.RUNNING if self.action.continuous else Status.SUCCESS
         error = self._side() * self._wanted_gap() + self._lateral_gap()
         if math.isnan(error):

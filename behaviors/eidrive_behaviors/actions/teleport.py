@@ -16,6 +16,11 @@ class TeleportAction(ActionBehaviour):
 
     action: model.TeleportAction
 
+    @property
+    def at_once(self) -> bool:
+        """True: a lateral step after it starts from its place."""
+        return True
+
     def update(self) -> Status:
         """Teleport the actor."""
         target = resolve_position(self.action.position, self.context, self.actor.name)

@@ -24,6 +24,14 @@ _DOMAINS: Mapping[type[model.Element], str] = {
 }
 """Control domain of each action with a duration (ASAM OpenSCENARIO XML, control strategies)."""
 
+_TRANSITIONS = (
+    model.TransitionDynamics
+    | model.LaneOffsetActionDynamics
+    | model.LongitudinalDistanceAction
+    | model.LateralDistanceAction
+)
+"""Elements that state whether an action takes time."""
+
 
 def conflicting_actions(context: LintContext) -> Iterator[Diagnostic]:
     """Yield actions of one event that end another one, as both control the same domain of the same entities."""
@@ -47,8 +55,8 @@ def _domains(action: model.Action) -> set[str]:
     leaf = next((element for element in elements if type(element) in _DOMAINS), None)
     if leaf is None:
         return set()
-    dynamics = model.TransitionDynamics | model.LaneOffsetActionDynamics
-    if any(model.is_immediate(part) for part in leaf.walk() if isinstance(part, dynamics)) and not never_ends(action):
+    transitions = (part for part in leaf.walk() if isinstance(part, _TRANSITIONS))
+    if any(map(model.is_immediate, transitions)) and not never_ends(action):
         return set()
     domains = {_DOMAINS[type(leaf)]}
     if isinstance(leaf, model.FollowTrajectoryAction) and leaf.time_reference.timing is not None:

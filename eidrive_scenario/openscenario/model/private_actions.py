@@ -164,8 +164,12 @@ class LaneOffsetActionDynamics(Element):
     max_lateral_acc: float | None = None
 
 
-def is_immediate(dynamics: TransitionDynamics | LaneOffsetActionDynamics) -> bool:
+def is_immediate(
+    dynamics: TransitionDynamics | LaneOffsetActionDynamics | LongitudinalDistanceAction | LateralDistanceAction,
+) -> bool:
     """Whether a transition ends at its start, as the limits of the vehicle do not apply either."""
+    if isinstance(dynamics, LongitudinalDistanceAction | LateralDistanceAction):
+        return dynamics.dynamic_constraints is None
     if isinstance(dynamics, LaneOffsetActionDynamics):
         return dynamics.dynamics_shape is DynamicsShape.STEP or dynamics.max_lateral_acc is None
     is_zero = dynamics.dynamics_dimension is not DynamicsDimension.RATE and dynamics.value == 0.0

@@ -48,6 +48,8 @@ class RuntimeContext(ActionContext, ControllerContext):
         """Whether an action reaches its goal in the current step."""
         self.pending_actions: list[Callable[[], None]] = []
         """Functions that stop actions that have started at this instant if their entity is still absent."""
+        self.instant_actions: list[tuple[str | None, Callable[[], None]]] = []
+        """Actor and update of each behaviour that takes no time, in the order of their starts at this instant."""
         self._holders: list[tuple[str, Domain, PreemptableAction, ActionBehaviour]] = []
         """Control domains with their actors, and the element and the behaviour that hold them."""
 
@@ -66,6 +68,7 @@ class RuntimeContext(ActionContext, ControllerContext):
         if external_poses:
             self.external_poses.update(external_poses)
         self.commands = Commands()
+        self.instant_actions.clear()
         self.progress.begin(view.tick, view.time)
         self.parting = {pair for pair in self.parting if _overlaps(view, *pair)}
         moved: set[MotionChange] = set()

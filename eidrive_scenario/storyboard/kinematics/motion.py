@@ -102,7 +102,7 @@ class Motion(MotionState):
     def teleport(self, position: ResolvedPosition) -> None:
         """Teleport the actor; its speed is kept.
 
-        The current step covers no distance, as the next view shows this pose.
+        The current step covers no distance, as the next view shows this pose, unless a later action requests one.
         """
         self._pose = position.pose
         self._set_location(position.location)
@@ -110,7 +110,7 @@ class Motion(MotionState):
         self._end_of_road = False
         if self._route_lanes is not None:
             self._route_lanes.forget()
-        self._rests = False
+        self._rests, self._lane_distance = False, None
         self._teleport = self._teleported = True
         self._teleports += 1
 
@@ -215,6 +215,8 @@ class Motion(MotionState):
         distance = self._speed * dt if lane_distance is None else lane_distance
         if self._teleport:
             self._teleport = False
+            if lane_distance is not None and target is None:
+                self._move(lane_distance, None, dt, along_lane=not self._crosses or self._carried)
             placement = self.placement()
             if self._leaves_curve:
                 self.leave_curve(after_step=False)
@@ -236,10 +238,9 @@ class Motion(MotionState):
         elif distance == 0.0 and steering is None:
             stands = self._speed == 0.0 and math.copysign(1.0, self._speed) == 1.0
             self._rests = stands and not self._end_of_road and not self._teleported
-        elif self._location is not None and (not self._crosses or (lane_distance is not None and self._carried)):
-            self._move_along_lane(distance, steering, dt)
         else:
-            self._move_freely(distance)
+            along_lane = not self._crosses or (lane_distance is not None and self._carried)
+            self._move(distance, steering, dt, along_lane=along_lane)
         x, y, z, h, p, r = self._pose
         across = distance == 0.0 or target is not None or lane_distance is not None
         speed = self.speed_along_heading
@@ -251,6 +252,12 @@ class Motion(MotionState):
         """Return the current placement."""
         x, y, z, h, p, r = self._pose
         return Placement(x, y, z, h, p, r, self.speed_along_heading, teleport)
+
+    def _move(self, distance: float, steering: LateralStep | None, dt: float, *, along_lane: bool) -> None:
+        if along_lane and self._location is not None:
+            self._move_along_lane(distance, steering, dt)
+        else:
+            self._move_freely(distance)
 
     def _move_along_lane(self, distance: float, steering: LateralStep | None, dt: float) -> None:
         assert self.roads is not None

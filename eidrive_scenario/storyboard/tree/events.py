@@ -131,6 +131,8 @@ class ActionElement(StoryElement):
         self._change(ElementTransition.START, ElementState.RUNNING, why)
         for behaviour in self.running:
             behaviour.stop(Status.INVALID)
+            if behaviour.at_once:
+                self.context.instant_actions.append((behaviour.actor_name, self.decide))
             self.context.acquire_domain(behaviour.actor_name, behaviour.controls, self, behaviour)
             if behaviour.immediate:
                 self._update_behaviour(behaviour)
@@ -163,6 +165,11 @@ class ActionElement(StoryElement):
         done = False
         if behaviour in self.running:
             if behaviour.at_once and self._decided_at is None and self._tried_at == self.context.progress.tick:
+                for name, decide in self.context.instant_actions:
+                    if decide == self.decide:
+                        break
+                    if name == behaviour.actor_name:
+                        decide()  # It starts from the place of a TeleportAction before it
                 self._update_behaviour(behaviour)
                 done = behaviour.status is Status.SUCCESS
             behaviour.stop(Status.INVALID)

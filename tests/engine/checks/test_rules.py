@@ -209,13 +209,26 @@ def test_conflicting_actions_include_continuous_steps(folder: Path) -> None:
         assert ("conflicting-actions" in violated_rules(folder, event)) == (continuous == "true")
 
 
-def test_conflicting_actions_exempt_lane_offsets_without_a_duration(folder: Path) -> None:
-    """Without `maxLateralAcc` an offset is reached at once."""
-    offset = """<PrivateAction><LateralAction><LaneOffsetAction continuous="false">
-      <LaneOffsetActionDynamics dynamicsShape="sinusoidal"{}/><LaneOffsetTarget>
-      <AbsoluteTargetLaneOffset value="1"/></LaneOffsetTarget></LaneOffsetAction></LateralAction></PrivateAction>"""
-    for limit, is_conflict in (("", False), (' maxLateralAcc="1"', True)):
-        action = f'<Action name="{{}}">{offset.format(limit)}</Action>'
+@pytest.mark.parametrize(
+    ("lateral", "limit"),
+    [
+        (
+            """<LaneOffsetAction continuous="false"><LaneOffsetActionDynamics dynamicsShape="sinusoidal"{}/>
+            <LaneOffsetTarget><AbsoluteTargetLaneOffset value="1"/></LaneOffsetTarget></LaneOffsetAction>""",
+            ' maxLateralAcc="1"',
+        ),
+        (
+            """<LateralDistanceAction entityRef="Other" continuous="false" freespace="false" distance="3">{}
+            </LateralDistanceAction>""",
+            '<DynamicConstraints maxSpeed="1"/>',
+        ),
+    ],
+)
+def test_conflicting_actions_exempt_lateral_actions_without_limits(folder: Path, lateral: str, limit: str) -> None:
+    """Without a limit the offset or distance is reached at once."""
+    for given, is_conflict in (("", False), (limit, True)):
+        private = f"<PrivateAction><LateralAction>{lateral.format(given)}</LateralAction></PrivateAction>"
+        action = f'<Action name="{{}}">{private}</Action>'
         event = f'<Event name="e" priority="parallel">{action.format("a")}{action.format("b")}</Event>'
         assert ("conflicting-actions" in violated_rules(folder, event)) == is_conflict
 
