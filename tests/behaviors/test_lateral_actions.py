@@ -228,6 +228,25 @@ def test_lateral_step_between_teleport_and_lane_change_starts_from_its_place(sce
     assert (played.at(0.1).y, played.at(4.0).y) == pytest.approx((-5.0, -2.0))
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_teleport_delays_a_lane_change_by_distance_by_its_step(scene: RunScene, order: int) -> None:
+    """2 m per step on the slope of 1 in 10; the step from 1.0 s on, onto the own place, covers no distance."""
+    here = teleport_xml(world_position_xml(119.9, -3.99))
+    steps = [("Ego", change(lane(-2), dimension="distance", value=40.0)), ("Ego", here, after(0.95))]
+    played = scene(3, *steps[::order])
+    for time, distance_on_slope in ((1.0, 20.0), (1.1, 20.0), (2.1, 40.0)):
+        assert played.at(time).y == pytest.approx(-2.0 - distance_on_slope / math.hypot(1.0, 10.0), abs=1e-3)
+    assert played.at(2.2).y == pytest.approx(-6.0)
+
+
+def test_lane_change_by_rate_keeps_its_rate_after_a_teleport(scene: RunScene) -> None:
+    """At 2.0 s the actor returns to y = -2, where the next view shows it: 4 m at 1 m/s from there."""
+    steps = [("Ego", change(lane(-2), dimension="rate", value=1.0))]
+    played = scene(7, *steps, ("Ego", teleport_xml(lane_position_xml(-1, 150.0)), after(1.95)))
+    assert [played.at(time).y for time in (2.1, 4.1)] == pytest.approx([-2.0, -4.0])
+    assert played.when("action 0", "completeState") == pytest.approx(6.1)
+
+
 @pytest.mark.element("LaneOffsetAction")
 def test_lane_offset_respects_the_lateral_acceleration(scene: RunScene) -> None:
     """Cubic over 1 m at 1.5 m/s²: √(6 / 1.5) = 2 s."""

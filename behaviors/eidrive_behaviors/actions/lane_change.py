@@ -107,6 +107,10 @@ class LaneChangeAction(ActionBehaviour):
         """True for a step that is not limited by the vehicle."""
         return model.is_immediate(self._dynamics) and not self.actor.driven
 
+    @property
+    def _is_by_distance(self) -> bool:
+        return self._dynamics.dynamics_dimension is model.DynamicsDimension.DISTANCE
+
     def initialise(self) -> None:
         """Find the target lane and express the actor's position as an offset from its center."""
         here = self.context.location(self.actor.name)
@@ -128,6 +132,8 @@ class LaneChangeAction(ActionBehaviour):
         start, target = moved.offset * way, (self.action.target_lane_offset or 0.0) * way
         self._transition = self._build_transition(start, target)
         self._path = None
+        self._progress = 0.0
+        """Parameter of the transition before the last step."""
         self._offset = start
         self._road, self._teleports = here.road, self.actor.motion.teleports
         if is_follow_mode(self._dynamics) and isinstance(self.actor.entity, model.Vehicle):
@@ -145,15 +151,19 @@ class LaneChangeAction(ActionBehaviour):
         """Set the offset at the end of the step."""
         if self.actor.driven:
             return self._set_driver_goal()
-        way = abs(self.actor.motion.speed) * self.context.dt
+        # The step of a teleport covers no distance
+        stays = self._is_by_distance and self.actor.motion.teleported
+        way = 0.0 if stays else abs(self.actor.motion.speed) * self.context.dt
         if self._transition.extent <= 0.0 and self._limited_offset is None:
             self.actor.motion.set_lateral_step(LateralStep(self._transition.target, 0.0, shortens_distance=False))
             return Status.SUCCESS
         if abs(self.actor.motion.speed) < STANDING or way == 0.0:
-            if self.context.dt > 0.0 and self._dynamics.dynamics_dimension is not model.DynamicsDimension.DISTANCE:
+            self._progress = self._transition.progress
+            if self.context.dt > 0.0 and not self._is_by_distance:
                 self._delay_warning.add("waits while the actor stands", FORWARD_LIMIT)
             return Status.RUNNING
         self._switch_reference_lane()
+        self._progress = self._transition.progress
         wanted = self._next_offset(way)
         rate: float | None = self._rate(way)
         if self._limited_offset is not None:
@@ -188,13 +198,18 @@ class LaneChangeAction(ActionBehaviour):
             return
         if motion.teleports != self._teleports:
             self._teleports = motion.teleports
+            if self._is_by_distance:
+                transition.progress = self._progress  # The teleport replaced the last step
             if self._has_target_lane(here):
                 here = motion.set_reference_lane(self._lane) or here
         offset = here.offset * self._roads.driving_direction(here.road, here.lane)
         if abs(offset - self._offset) <= SHIFTED:
             return
-        left = max(transition.extent - transition.progress, EPSILON)
-        self._transition = TransitionProfile(transition.shape, offset, transition.target, left)
+        if self._dynamics.dynamics_dimension is model.DynamicsDimension.RATE:
+            self._transition = self._build_transition(offset, transition.target)
+        else:
+            left = max(transition.extent - transition.progress, EPSILON)
+            self._transition = TransitionProfile(transition.shape, offset, transition.target, left)
         if self._limited_offset is not None:
             self._limited_offset = RateLimitedValue(offset, self._limited_offset.rate, up=math.inf, down=math.inf)
         self._offset = offset
@@ -206,7 +221,7 @@ class LaneChangeAction(ActionBehaviour):
 
     def _next_offset(self, way: float) -> float:
         transition = self._transition
-        if self._dynamics.dynamics_dimension is not model.DynamicsDimension.DISTANCE:
+        if not self._is_by_distance:
             return transition.advance(self.context.dt)
         before = transition.progress
         sideways = transition.advance(way) - self._offset
@@ -217,7 +232,7 @@ class LaneChangeAction(ActionBehaviour):
     def _rate(self, way: float) -> float:
         """Return the rate of the offset at the end of a step of this distance [m/s]."""
         slope = self._transition.slope
-        if self._dynamics.dynamics_dimension is not model.DynamicsDimension.DISTANCE:
+        if not self._is_by_distance:
             return slope
         return way / self.context.dt * slope / math.hypot(1.0, slope)
 
@@ -300,8 +315,7 @@ class LaneChangeAction(ActionBehaviour):
         transition = self._build_transition((here.t - center.t) * way, (self.action.target_lane_offset or 0.0) * way)
         goal, pose, route = self.actor.goal, self.actor.motion.pose, self.actor.motion.route
         speed = max(self.context.speed(self.actor.name), (goal.speed if goal is not None else None) or 0.0, SLOWEST)
-        by_distance = self._dynamics.dynamics_dimension is model.DynamicsDimension.DISTANCE
-        per_meter = 1.0 if by_distance else 1.0 / speed  # Progress of the transition along the lane
+        per_meter = 1.0 if self._is_by_distance else 1.0 / speed  # Progress of the transition along the lane
         if route is None:
             length = transition.extent / per_meter + LOOKOUT + LOOKOUT_TIME * speed
         else:
