@@ -221,6 +221,16 @@ def test_distances_without_limits_apply_in_the_step_of_a_teleport(run: Run, in_i
     assert view.position[view.rows["Ego"], :2].tolist() == pytest.approx([130.5, -3.0])
 
 
+def test_actions_of_init_keep_their_order_while_the_first_awaits_an_entity(run: Run) -> None:
+    """Other is placed after Ego: the distance sets 10 m/s, from which the speed falls to 2 m/s in 4 s."""
+    beside_it = distance("Lateral", 3).replace('continuous="false"', 'continuous="true"')
+    actions = (distance("Longitudinal", 20), speed_xml(2, 4.0), beside_it, change(lane(-2)))
+    played = run(4.5, driven=False, init=init_xml("Ego", *actions), others={"Other": (-2, 150.0, 10.0)})
+    halfway, end = (played.frames[round(time / 0.05)].view for time in (2.0, 4.0))
+    assert halfway.speed[halfway.rows["Ego"]] == pytest.approx(6.0)
+    assert end.position[end.rows["Ego"], 1] == pytest.approx(-6.0, abs=1e-6)
+
+
 def test_lateral_step_between_teleport_and_lane_change_starts_from_its_place(scene: RunScene) -> None:
     """The three actions start together: 1 m left of lane -2, from there linearly to lane -1."""
     steps = (teleport_xml(lane_position_xml(-2, 100.0)), STEP_ASIDE, change(lane(-1)))

@@ -45,9 +45,8 @@ class LongitudinalDistanceAction(ActionBehaviour):
 
     @property
     def at_once(self) -> bool:
-        """True for a distance that is reached in one step and not kept. In Init it follows the actions of its actor."""
-        is_immediate = model.is_immediate(self.action) and not self.action.continuous
-        return is_immediate and not self.actor.driven and self.context.dt > 0.0
+        """True for a distance that is reached at once and not kept."""
+        return model.is_immediate(self.action) and not self.action.continuous and not self.actor.driven
 
     def initialise(self) -> None:
         """Reset the acceleration; without a displacement select the current side of the other entity."""

@@ -46,7 +46,8 @@ class InitBlock(Composite):
         """Execute the actions before the first view, in the order of the file.
 
         An action that refers to an entity that a later action places is executed after it, and one that reads the speed
-        of an entity after the actions that set it. Raise ScenarioError for cyclic references of positions.
+        of an entity after the actions that set it; the actions of its actor on the same domain that follow it wait,
+        too. Raise ScenarioError for cyclic references of positions.
         """
         pending, reads_speeds = list(self.running), False
         while pending:
@@ -57,7 +58,12 @@ class InitBlock(Composite):
                 awaits_speed = any(
                     other.actor_name == reference and other.controls & Domain.LONGITUDINAL for other in later
                 )
-                if awaits_speed or not self._start_behaviour(behaviour):
+                name, is_blocked = behaviour.actor_name, awaits_speed
+                if name is not None and behaviour.actor.present:
+                    is_blocked |= any(
+                        other.actor_name == name and other.controls & behaviour.controls for other in blocked
+                    )
+                if is_blocked or not self._start_behaviour(behaviour):
                     blocked.append(behaviour)
             if len(blocked) == len(pending) and reads_speeds:
                 raise blocked[0].error(
