@@ -13,7 +13,15 @@ from eidrive_scenario.base.wall_limit import LimitReached, limit_wall_time
 from eidrive_scenario.cli.options import HelpAll, check_output_paths, takes_run_options
 from eidrive_scenario.cli.output import echo, print_error, print_unused_projects
 from eidrive_scenario.cli.supervision import supervise
-from eidrive_scenario.errors import ABORTED, INVALID_INPUT, Diagnostic, InputError, WallLimitError, counted, in_one_line
+from eidrive_scenario.errors import (
+    ABORTED,
+    INVALID_INPUT,
+    Diagnostic,
+    InputError,
+    SimulationError,
+    counted,
+    in_one_line,
+)
 from eidrive_scenario.run_options import FLAGS, RunSettings, check_seconds, diagnostic_with_option_names
 
 if TYPE_CHECKING:
@@ -54,7 +62,7 @@ def check(
     aborted: list[str] = []
     printed: dict[str, dict[Diagnostic, None]] = {"error": {}, "warning": {}, "note": {}}
 
-    def report_hang(error: WallLimitError) -> None:
+    def report_hang(error: SimulationError) -> None:
         print_error(error, "check", *in_progress)
         if sarif is not None:
             _write_sarif(sarif, printed, [*aborted, ": ".join(map(str, (*in_progress, error)))])

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import typer
 
 from eidrive_scenario.cli.output import echo, has_all_characters, print_error, show_traceback
-from eidrive_scenario.errors import ABORTED, EidriveError, WallLimitError
+from eidrive_scenario.errors import ABORTED, EidriveError, SimulationError
 
 if TYPE_CHECKING:
     from eidrive_scenario.base.wall_limit import Limit
@@ -32,12 +32,13 @@ def allow() -> None:
 
 
 def supervise(
-    limit: float, report: Callable[[WallLimitError], None], subject: dict[str, Any] | None = None, what: str = "run"
+    limit: float, report: Callable[[SimulationError], None], subject: dict[str, Any] | None = None, what: str = "run"
 ) -> None:
     """Continue in a child process. The parent waits and ends with its exit code, or 3 for an abnormal end.
 
     limit    wall limit of each run or check [s]
-    report   prints the error of a run that does not return: in the child, or else in the parent
+    report   prints the error of a run that does not return, in the child or else in the parent, or that of an ended
+             child
     subject  description of the run in progress, which the parent gets before it reports
     what     subject of messages: run or check
 
@@ -84,7 +85,16 @@ def supervise(
                 error.add_note(line)
         report(error)
         raise typer.Exit(ABORTED)
-    raise typer.Exit(_exit_code(status, finished, what))
+    code = os.waitstatus_to_exitcode(status)
+    if code < 0:
+        from eidrive_scenario.base.wall_limit import signal_name
+
+        report(SimulationError(f"its process was ended by {signal_name(-code)}"))
+        raise typer.Exit(ABORTED)
+    if code != ABORTED and not os.read(finished, 1):
+        report(SimulationError("an extension ended its process (os._exit)"))
+        raise typer.Exit(ABORTED)
+    raise typer.Exit(code)
 
 
 def _content(file: BinaryIO) -> str:
@@ -98,19 +108,6 @@ def _wait(child: int) -> int:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, lambda received, frame: os.kill(child, received))
     return os.waitpid(child, 0)[1]
-
-
-def _exit_code(status: int, finished: int, what: str) -> int:
-    code = os.waitstatus_to_exitcode(status)
-    if code < 0:
-        from eidrive_scenario.base.wall_limit import signal_name
-
-        echo(f"{what} aborted: its process was ended by {signal_name(-code)}", err=True)
-        return ABORTED
-    if code != ABORTED and not os.read(finished, 1):
-        echo(f"{what} aborted: an extension ended its process (os._exit)", err=True)
-        return ABORTED
-    return code
 
 
 class RunFailures:
@@ -136,8 +133,8 @@ class RunFailures:
         self._print_json(error)
         (show_traceback if self._traceback else print_error)(error)
 
-    def report_hang(self, error: WallLimitError) -> None:
-        """Report a run that does not return at its wall limit."""
+    def report_hang(self, error: SimulationError) -> None:
+        """Report a run that does not return at its wall limit, or whose process ended."""
         self._print_json(error)
         print_error(error)
 

@@ -84,6 +84,16 @@ def test_check_hanging_native_code_exits_with_3(folder: Path) -> None:
 
 
 @pytest.mark.exhaustive
+def test_killed_check_process_replaces_the_sarif_log_of_an_earlier_check(folder: Path) -> None:
+    write_scenario(folder / "killed.xosc", detector="kills_process_when_built")
+    (folder / "check.sarif").write_text("{}")
+    code, _, err = check(folder, "killed.xosc", "--wall-limit", "600", "--sarif", "check.sarif")
+    assert (code, err) == (3, "check aborted: its process was ended by SIGKILL\n")
+    (invocation,) = json.loads((folder / "check.sarif").read_text())["runs"][0]["invocations"]
+    assert not invocation["executionSuccessful"]
+
+
+@pytest.mark.exhaustive
 def test_check_exiting_extension_is_reported_and_other_files_checked(folder: Path) -> None:
     write_scenario(folder / "exits.xosc", detector="exits_when_built")
     code, out, err = check(folder, "exits.xosc", "z_right.xosc")

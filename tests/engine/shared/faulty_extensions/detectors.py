@@ -64,6 +64,11 @@ class KillsProcess(Detector):
         os.kill(os.getpid(), signal.SIGKILL)
 
 
+class KillsProcessWhenBuilt(KillsProcess):
+    def __init__(self):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
 class HangsWhenBuilt(Detector):
     def __init__(self):
         while True:

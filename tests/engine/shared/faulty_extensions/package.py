@@ -44,6 +44,7 @@ POINTS = {
         "deadlocks": "Deadlocks",
         "ends_process": "EndsProcess",
         "kills_process": "KillsProcess",
+        "kills_process_when_built": "KillsProcessWhenBuilt",
         "hangs_when_built": "HangsWhenBuilt",
         "hangs_in_c_when_built": "HangsInCWhenBuilt",
         "exits": "Exits",
