@@ -38,12 +38,16 @@ def number_text(value: float, unit: str) -> str:
 
 
 def metric_titles(runs: Sequence[ReportedRun]) -> dict[str, str]:
-    """Return the names of all metrics with their units, which are usually those of their criteria."""
-    units = {criterion.name: criterion.unit for run in reversed(runs) for criterion in run.criteria}
+    """Return the names of all metrics with their units, which are usually those of their criteria.
+
+    The criterion of a metric is the one with the longest name with which that of the metric begins.
+    """
+    units = {f"{criterion.name}.": criterion.unit for run in reversed(runs) for criterion in run.criteria}
+    by_length = sorted(units, key=len, reverse=True)
     titles = {}
     for name in dict.fromkeys(name for run in runs for name in run.metrics):
         last = name.split(".")[-1]
-        unit = _UNITS[last] if last in _UNITS else units.get(name.split(".")[0], "")
+        unit = _UNITS[last] if last in _UNITS else next((units[own] for own in by_length if name.startswith(own)), "")
         titles[name] = f"{name.replace('.', ' ')} [{unit}]" if unit else name.replace(".", " ")
     return titles
 

@@ -18,9 +18,18 @@ function measured(title, value) {
   return [name, short(value), unit].filter(Boolean).join(" ");
 }
 
+/* Return the beginning of the titles of metrics of a criterion: its name without dots. */
+const beginningOf = ({ name }) => `${name.replaceAll(".", " ")} `;
+
+/* Return the metrics whose titles begin with this criterion, and with none of the others that has a longer name. */
+function metricsOfCriterion(criterion, criteria, metrics) {
+  const own = beginningOf(criterion), longer = criteria.map(beginningOf).filter((other) => other.length > own.length);
+  return metrics.filter(([title]) => title.startsWith(own) && !longer.some((other) => title.startsWith(other)))
+    .map(([title, value]) => [title.slice(own.length), value]);
+}
+
 /* Return the line of a criterion. Its metrics, such as the distances of centers and of boxes, are beside its value. */
-function criterionItem(criterion, metrics) {
-  const own = metrics.filter(([title]) => title.startsWith(`${criterion.name} `));
+function criterionItem(criterion, own) {
   const values = [withUnit(criterion.value, criterion.unit), criterion.limit === null ? "" : `limit ${withUnit(criterion.limit, criterion.unit)}`];
   const verdict = criterion.passed ? "passed" : "failed";
   return make("li", { class: criterion.passed ? "holds" : "fails" },
@@ -28,14 +37,14 @@ function criterionItem(criterion, metrics) {
     make("span", { class: "values" }, values.filter(Boolean).join(", ")),
     ...(criterion.reason ? [make("div", null, criterion.reason)] : []),
     ...criterion.state.map((line) => make("div", { class: "setting" }, line)),
-    ...(own.length ? [make("div", { class: "setting" }, own.map(([title, value]) => measured(title.slice(criterion.name.length + 1), value)).join(" · "))] : []));
+    ...(own.length ? [make("div", { class: "setting" }, own.map(([title, value]) => measured(title, value)).join(" · "))] : []));
 }
 
 /* Return the content of the opened row of a run. */
 function detailsOf(run) {
   const metrics = metricsOf(run), criteria = criteriaOf(run), settings = settingsOf(run);
   const command = text(data.commands[run]), replay = text(data.replays[run]), group = data.groups[run];
-  const parts = [criteria.length ? make("ul", { class: "checks" }, ...criteria.map((criterion) => criterionItem(criterion, metrics)))
+  const parts = [criteria.length ? make("ul", { class: "checks" }, ...criteria.map((criterion) => criterionItem(criterion, metricsOfCriterion(criterion, criteria, metrics))))
                                  : make("p", null, "No criterion judges the run.")];
   const facts = data.facts.map((fact) => fact.number ? measured(fact.title, valueIn(fact, run)) : `${fact.title} ${valueIn(fact, run)}`);
   parts.push(make("p", { class: "setting" }, facts.join(" · ")));

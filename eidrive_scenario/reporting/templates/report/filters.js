@@ -92,7 +92,7 @@ function fromAddress() {
   state.outcomes = new Set((given.get("outcome") || "").split(",").map((name) => OUTCOMES.indexOf(name)).filter((outcome) => outcome >= 0));
   state.scenario = given.get("scenario") || "";
   state.criterion = given.get("criterion") || "";
-  const group = given.has("group") ? Number(given.get("group")) : -1;
+  const group = /^\d+$/.test(given.get("group") || "") ? Number(given.get("group")) : -1;
   state.group = data.groupNames[group] === undefined ? null : group;
   const sort = given.get("sort") || FIRST_SORT;
   state.sort = titled(sort) || titled(sort.replace(/^-/, "")) || columns[0];
