@@ -682,6 +682,26 @@ def test_columns_and_filters_of_report_are_in_its_address(browser: Any, runs_pag
     assert runs_page.count() < 30
 
 
+def test_empty_group_in_address_of_report_filters_nothing(browser: Any, tmp_path: Path) -> None:
+    runs = [reported_run(seed, passed=True) for seed in range(1, 7)]
+    page = ReportPage(browser, write_run_report(runs, tmp_path), 1440, address="#group=")
+    assert page.count() == 6
+    page.close("report-group", full=False)
+
+
+def test_metrics_belong_to_the_longest_name_of_a_criterion(browser: Any, tmp_path: Path) -> None:
+    run = reported_run(1, passed=False)
+    run["criteria"] = [
+        {"name": "gap", "passed": False, "unit": "m"},
+        {"name": "gap v1.5", "passed": True, "unit": "s"},
+    ]
+    run["metrics"] = {"gap.Ego.center": 4.0, "gap v1.5.Ego.center": 3.0}
+    page = ReportPage(browser, write_run_report([run], tmp_path), 1440)
+    items = page.page.locator("#table .details .checks li")
+    assert items.locator(".setting").all_inner_texts() == ["Ego center 4 m", "Ego center 3 s"]
+    page.close("report-criteria", full=False)
+
+
 def test_long_column_title_of_report_breaks_between_its_parts(runs_page: ReportPage) -> None:
     page = runs_page.page
     page.locator("#columns summary").click()
@@ -823,6 +843,25 @@ def test_live_view_fills_and_becomes_the_replay(browser: Any, eidrive: Eidrive, 
                 assert each.page.inner_text(f"#{part}") == recorded.page.inner_text(f"#{part}")
             assert not each.faults
         late.close("live-end")
+
+
+@pytest.mark.timeout(300)
+def test_keys_before_the_first_frame_leave_a_live_view_at_the_end(browser: Any, tmp_path: Path) -> None:
+    opened: list[str] = []
+    first, last = Gate(0), Gate(8)
+    with (
+        LiveView(speed=math.inf, wait=0.0, browser=False, announce=opened.append) as live,
+        ThreadPoolExecutor() as pool,
+    ):
+        run = pool.submit(run_and_save, "coop/scenario_1", out=tmp_path / "run", observers=[first, live, last])
+        page = Page(browser, None, 1440, site=address_of(opened))
+        for key in (" ", "ArrowRight", "Home", "End"):
+            page.page.keyboard.press(key)
+        first.opened.set()
+        page.wait("last === 8 && shown.time === 0.4")
+        last.opened.set()
+        assert run.result().passed
+        page.close("live-keys", full=False)
 
 
 @pytest.mark.timeout(300)

@@ -45,5 +45,6 @@ function paint(now) {
 
 element("at-end").onchange = (event) => { pause(); followEnd(event.target.checked); };
 running = true;
+followEnd(true);
 showState("waiting for the run");
 requestAnimationFrame(paint);

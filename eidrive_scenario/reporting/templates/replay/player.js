@@ -16,8 +16,9 @@ function showTime(time) {
   showPanels();
 }
 
-/* Stop, and show an instant. */
+/* Stop, and show an instant. Before the first frame there is none. */
 function seek(time) {
+  if (last < 0) return;
   pause();
   followEnd(false);
   showTime(time);
@@ -110,6 +111,7 @@ function followEnd(on) {
 }
 
 function play() {
+  if (last < 0) return;
   const end = instants[instants.length - 1] - 1e-6;
   if (running && shown.time >= end) { followEnd(true); return; }
   followEnd(false);
@@ -226,7 +228,7 @@ function begin() {
   selectStation(shown.station);
   fit();
   const linked = fromAddress();
-  followEnd(linked === null);
+  followEnd(atEnd && linked === null);
   showTime(linked !== null ? linked : atEnd ? data.times[last] : data.decisive ? data.decisive.time : data.times[0]);
 }
 
