@@ -138,7 +138,7 @@ def main() -> None:
         cpu.append(time.process_time() - started)
         running.append(result.wall_s)
         hashes.add(result.trace_hash)
-    ticks = round(result.simulated_s / 0.05)
+    ticks = round(result.simulated_s / 0.05) + 1
     swarm = len(simulation.storyboard.context.traffic_names)
     print(f"{options.town}: {options.scripted} scripted cars, a swarm of {options.swarm} ({swarm} at the end)")
     comparison = "equal traces" if len(hashes) == 1 else f"{len(hashes)} DIFFERENT TRACES"
