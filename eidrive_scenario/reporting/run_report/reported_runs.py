@@ -111,12 +111,11 @@ def _as_result(run: StoredRun) -> dict[str, Any]:
     result = run.result
     count = result.get("warnings")
     settings = json.loads(run.settings) if run.settings else {}
-    names = [name.removesuffix(".passed") for name in result if name.endswith(".passed")]
-    criteria = [
-        {"name": name, **{end[1:]: result.get(name + end) for end in _ENDINGS}}
-        for name in names
-        if result.get(f"{name}.passed") is not None
-    ]
+    # Metrics may end alike, such as those of a monitor with the name door.passed, but are no truth values
+    verdicts = [name for name, value in result.items() if name.endswith(".passed") and isinstance(value, bool)]
+    names = [name.removesuffix(".passed") for name in verdicts]
+    of_criteria = {name + end for name in names for end in _ENDINGS}
+    criteria = [{"name": name, **{end[1:]: result.get(name + end) for end in _ENDINGS}} for name in names]
     return {
         "scenario": run.scenario,
         "run": run.run,
@@ -125,7 +124,9 @@ def _as_result(run: StoredRun) -> dict[str, Any]:
         "passed": result.get("passed"),
         "end_reason": result.get("end_reason"),
         "criteria": criteria,
-        "metrics": {name: value for name, value in result.items() if _is_metric(name, value)},
+        "metrics": {
+            name: value for name, value in result.items() if name not in of_criteria and _is_metric(name, value)
+        },
         "warnings": [f"{counted(count, 'warning')}, printed by the command of the run"] if count else [],
         "parameters": settings.get("parameters", {}),
         "settings": settings,
@@ -138,4 +139,4 @@ def _as_result(run: StoredRun) -> dict[str, Any]:
 
 def _is_metric(name: str, value: Any) -> bool:
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return is_number and name not in _FIXED and not name.startswith(_PREFIXES) and not name.endswith(_ENDINGS)
+    return is_number and name not in _FIXED and not name.startswith(_PREFIXES)

@@ -161,8 +161,17 @@ def test_lists_of_one_value_are_no_space() -> None:
         ({"goal.passed": True, "goal.value": 1.99, "goal.limit": 2.0, "goal.margin": 1.0}, 2.0),
         ({"seen.passed": True, "seen.value": 1.0, "seen.limit": 1.0, "seen.margin": 1.0}, 2.0),
         ({"off.passed": True, "off.value": 0.0, "off.limit": 0.5}, 2.0),
+        ({"monitor.door.passed": 0.0}, 2.0),
     ],
-    ids=["reached", "without limit", "infinite limit", "reached without deadline", "monitor", "nothing of the allowed"],
+    ids=[
+        "reached",
+        "without limit",
+        "infinite limit",
+        "reached without deadline",
+        "monitor",
+        "nothing of the allowed",
+        "metric",
+    ],
 )
 def test_falsify_follows_the_margin_that_varies(plan: SweepPlan, other: dict[str, Any], size: float) -> None:
     """The gap is least at the speed 31, without a failure. A run that ends on arrival is near the tolerance."""

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from command_fixtures import Eidrive, eidrive
 from lxml import html
+from msgspec.structs import replace
 from report_table import listed_runs
 
 from eidrive_scenario.errors import SettingError
@@ -124,6 +125,16 @@ def test_warnings_of_runs_without_files_are_counted(tmp_path: Path) -> None:
     text = page_of(tmp_path, runs).text_content()
     assert "2 runs have warnings" in text
     assert f"2 runs: 1 warning, printed by the command of the run (such as {runs[0].command})" in text
+
+
+def test_metrics_that_end_like_columns_of_criteria_remain_metrics(tmp_path: Path) -> None:
+    monitors = {"monitor.door.passed": 1.0, "monitor.speed.limit": 0.0}
+    run = row(1, True)
+    with ResultStore.open(tmp_path / "s.db", {}) as store:
+        store.add(replace(run, result={**run.result, **monitors}))
+    (reported,), _ = read_sweeps([tmp_path / "s.db"])
+    assert [criterion.name for criterion in reported.criteria] == ["gap"]
+    assert reported.metrics == {"gap.Ego": 1.5, **monitors}
 
 
 def test_missing_files_of_kept_runs_leave_the_numbers(tmp_path: Path) -> None:
