@@ -31,8 +31,9 @@ class MapRule(Enum):
     ROAD_LINK = "a link to a missing road or junction, or to a point within a road"
     ROAD_SURFACE = "a cross section that is not read, or a superelevation that is too steep"
     ROAD_MARK = "an incomplete road mark"
-    SIGNAL_OFF_ROAD = "a signal beyond the ends of its road"
+    SIGNAL_OFF_ROAD = "a signal beyond the ends of its road, or for lanes that do not exist"
     OBJECT_OFF_ROAD = "an object, or a repetition of one, beyond the ends of its road"
+    OBJECT_SIZE = "an object of negative size"
     LANE_LINK = "a lane link to a missing lane, or a lane without a successor"
     JUNCTION_CONNECTION = "a connection that does not match its junction"
 

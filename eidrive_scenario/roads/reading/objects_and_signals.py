@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from typing import Literal
 
 from lxml import etree
 from msgspec.structs import replace
@@ -67,24 +68,43 @@ def read_signals(
 
 def _read_place(road: Road, element: etree._Element, collector: AttributeReader) -> SignalPlace:
     orientation = element.get("orientation", "none")
+    s = _s_on_road(road, element, collector, "signal", MapRule.SIGNAL_OFF_ROAD)
     return SignalPlace(
         road=road.id,
-        s=_s_on_road(road, element, collector, "a signal", MapRule.SIGNAL_OFF_ROAD),
+        s=s,
         t=collector.number(element, "t"),
         orientation=orientation if orientation in ("+", "-") else "none",
-        validity=tuple(
-            (collector.integer(v, "fromLane"), collector.integer(v, "toLane")) for v in element.iterfind("validity")
-        ),
+        validity=tuple(_read_validity(road, s, v, collector) for v in element.iterfind("validity")),
     )
 
 
-def _s_on_road(road: Road, element: etree._Element, collector: AttributeReader, name: str, rule: MapRule) -> float:
+def _read_validity(road: Road, s: float, element: etree._Element, collector: AttributeReader) -> tuple[int, int]:
+    """Return the first and the last lane for which a signal is valid. Lane 0 alone stands for no lane."""
+    first, last = (collector.integer(element, name) for name in ("fromLane", "toLane"))
+    lanes = road.section_at(s).lanes if road.sections else {}
+    if lanes and not any(min(first, last) <= number <= max(first, last) for number in lanes):
+        which = f"lane {first}" if first == last else f"lanes {first} to {last}"
+        message = f"a signal at s = {s:g} m of road {road.id!r} is valid for {which}, which do not exist there"
+        hint = "known: " + ", ".join(map(str, sorted(lanes)))
+        kind = "signals for lanes that do not exist"
+        collector.report_warning(element, MapRule.SIGNAL_OFF_ROAD, kind, message, hint)
+    return first, last
+
+
+def _s_on_road(
+    road: Road,
+    element: etree._Element,
+    collector: AttributeReader,
+    noun: Literal["signal", "object"],
+    rule: MapRule,
+) -> float:
     """Return the s coordinate of an element [m], that of the nearest end of the road if it is beyond it."""
     s = collector.number(element, "s")
     held = min(max(s, 0.0), road.length)
     if abs(s - held) > BEYOND:
-        message = f"{name} is at s = {s:g} m of road {road.id!r}; s = {held:g} m is used"
-        kind = f"{name.split()[1]}s beyond the ends of their roads"
+        article = "an" if noun == "object" else "a"
+        message = f"{article} {noun} is at s = {s:g} m of road {road.id!r}; s = {held:g} m is used"
+        kind = f"{noun}s beyond the ends of their roads"
         collector.report_warning(element, rule, kind, message, f"the road extends from 0 to {road.length:g} m")
     return held
 
@@ -144,7 +164,7 @@ def read_object(road: Road, element: etree._Element, collector: AttributeReader)
     repeats = tuple(_read_repeat(road, repeat, element, collector) for repeat in element.iterfind("repeat"))
     s = collector.number(element, "s")
     if not repeats:
-        s = _s_on_road(road, element, collector, "an object", MapRule.OBJECT_OFF_ROAD)
+        s = _s_on_road(road, element, collector, "object", MapRule.OBJECT_OFF_ROAD)
     areas: list[tuple[Corner, ...]] = []
     lines: list[tuple[Corner, ...]] = []
     for outline in (*element.iterfind("outline"), *element.iterfind("outlines/outline")):
@@ -164,14 +184,24 @@ def read_object(road: Road, element: etree._Element, collector: AttributeReader)
         heading=number("hdg"),
         pitch=number("pitch"),
         roll=number("roll"),
-        length=number("length"),
-        width=number("width"),
-        height=number("height"),
-        radius=number("radius"),
+        length=_read_size(element, "length", collector),
+        width=_read_size(element, "width", collector),
+        height=_read_size(element, "height", collector),
+        radius=_read_size(element, "radius", collector),
         outlines=tuple(areas),
         lines=tuple(lines),
         repeats=repeats,
     )
+
+
+def _read_size(element: etree._Element, name: str, collector: AttributeReader, default: float = 0.0) -> float:
+    """Return a size of an object [m]; 0, as of an omitted one, if it is negative."""
+    size = collector.number(element, name, default)
+    if size < 0.0:
+        message = f"<{element.tag}> has {name}={size:g}, which counts as omitted"
+        hint = "give a size of at least 0"
+        collector.report_warning(element, MapRule.OBJECT_SIZE, "negative sizes of objects", message, hint)
+    return max(size, 0.0)
 
 
 def _read_corners(outline: etree._Element, collector: AttributeReader) -> list[Corner]:
@@ -193,8 +223,12 @@ def _read_corners(outline: etree._Element, collector: AttributeReader) -> list[C
 def _read_repeat(road: Road, repeat: etree._Element, element: etree._Element, collector: AttributeReader) -> Repeat:
     def pair(name: str) -> tuple[float, float]:
         fallback = collector.number(element, name, 0.0)
-        start = collector.number(repeat, f"{name}Start", fallback)
-        end = collector.number(repeat, f"{name}End", start)
+        if name in ("t", "zOffset"):
+            start = collector.number(repeat, f"{name}Start", fallback)
+            end = collector.number(repeat, f"{name}End", start)
+        else:
+            start = _read_size(repeat, f"{name}Start", collector, max(fallback, 0.0))
+            end = _read_size(repeat, f"{name}End", collector, start)
         begins, ends = (end if share == 1.0 else start + (end - start) * share for share in on_road)
         return begins, ends
 
@@ -222,18 +256,19 @@ def _read_repeat(road: Road, repeat: etree._Element, element: etree._Element, co
         skipped = distance * math.ceil(-s / distance - EPSILON) if distance > 0.0 else -s
         on_road = max(skipped, 0.0) / length, min(max(road.length - s, 0.0) / length, 1.0)
         s, length = s + on_road[0] * length, (on_road[1] - on_road[0]) * length
-    for name in ("width", "height", "length", "radius", "t", "zOffset"):
-        if max(map(abs, pair(name))) > MAX_OBJECT_SIZE:
+    pairs = {name: pair(name) for name in ("width", "height", "length", "radius", "t", "zOffset")}
+    for name, values in pairs.items():
+        if max(map(abs, values)) > MAX_OBJECT_SIZE:
             collector.report_error(repeat, f"<repeat> has a {name} beyond {MAX_OBJECT_SIZE:g} m", "correct it")
     return Repeat(
         s=s,
         length=length,
         distance=distance,
-        t=pair("t"),
-        width=pair("width"),
-        height=pair("height"),
-        z_offset=pair("zOffset"),
-        size=pair("length"),
-        radius=pair("radius"),
+        t=pairs["t"],
+        width=pairs["width"],
+        height=pairs["height"],
+        z_offset=pairs["zOffset"],
+        size=pairs["length"],
+        radius=pairs["radius"],
         detached=collector.flag(repeat, "detachFromReferenceLine"),
     )

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from opendrive_xml import map_xml, road_xml, section_xml
 
-from eidrive_scenario.roads import RoadNetwork
+from eidrive_scenario.roads import RoadNetwork, placed_objects
 
 LINE = '<geometry s="{s}" x="{x}" y="{y}" hdg="{h}" length="50"><line/></geometry>'
 WIDTH = '<width sOffset="{0}" a="{1}" b="{2}" c="{3}" d="{4}"/>'
@@ -191,6 +191,41 @@ def test_curve_of_another_length_than_stated_is_a_warning(shape: str, path: str 
     message = f"the curve of a geometry of road '1' is {path} m long, but its length is 50 m"
     warnings = [("geometry-gap", message)] if path else []
     assert map_warnings(map_xml(road_xml(length=50.0, geometry=geometry))) == warnings
+
+
+def test_negative_sizes_of_objects_count_as_omitted_with_a_warning() -> None:
+    repeat = '<repeat s="0" length="100" distance="50" tStart="6" tEnd="6" widthStart="-1" widthEnd="3"/>'
+    objects = "".join(
+        f'<object id="{number}" type="pole" s="20" t="-6" length="2" width="2" {sizes}>{more}</object>'
+        for number, (sizes, more) in enumerate((('height="-4"', ""), ('radius="-1" height="5"', ""), ("", repeat)))
+    )
+    network = RoadNetwork.parse(map_xml(road_xml(extra=f"<objects>{objects}</objects>")), "town.xodr")
+    (diagnostic,) = network.map_warnings
+    assert diagnostic.rule == "object-size"
+    assert diagnostic.message == (
+        "<object> has height=-4, which counts as omitted; 2 more of negative sizes of objects: line 1, 1"
+    )
+    sizes = [(placed.length, placed.width, placed.height) for placed in placed_objects(network)]
+    assert sizes == [(2.0, 2.0, 0.0), (2.0, 2.0, 5.0), (2.0, 1.5, 0.0), (2.0, 3.0, 0.0)]
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "which"),
+    [(-3, -2, "lanes -3 to -2"), (2, 2, "lane 2"), (-3, -1, ""), (1, 1, ""), (0, 0, "")],
+)
+def test_signal_for_lanes_that_do_not_exist_is_a_warning(first: int, last: int, which: str) -> None:
+    """The road has two lanes to the right up to 60 m."""
+    signal = (
+        '<signal id="7" s="80" t="-5" dynamic="yes" orientation="+" zOffset="2" type="1000001">'
+        f'<validity fromLane="{first}" toLane="{last}"/></signal>'
+    )
+    lanes = section_xml(lane(1), lane(-1) + lane(-2)) + section_xml(lane(1), lane(-1), s=60)
+    text = map_xml(road_xml(lanes=lanes, extra=f"<signals>{signal}</signals>"))
+    warnings = [message for rule, message in map_warnings(text) if rule == "signal-off-road"]
+    assert warnings == [
+        f"a signal at s = 80 m of road '1' is valid for {shown}, which do not exist there"
+        for shown in filter(None, [which])
+    ]
 
 
 def test_ignored_lateral_profiles_are_warnings() -> None:
