@@ -50,8 +50,9 @@ def random_costs(network: RoadNetwork, generator: np.random.Generator) -> Cost:
     """Return the length times a random factor of each road as cost [m], so that different draws select different
     routes.
     """
-    draws = generator.uniform(0.0, math.log(MAX_FACTOR), len(network.roads)).tolist()
-    factors = {road: math.exp(draw) for road, draw in zip(network.roads, draws, strict=True)}
+    names = sorted(network.roads)  # the order in the file has no effect
+    draws = generator.uniform(0.0, math.log(MAX_FACTOR), len(names)).tolist()
+    factors = {road: math.exp(draw) for road, draw in zip(names, draws, strict=True)}
 
     def cost(lane: LaneKey, _: LaneKey, data: Mapping[str, Any]) -> float:
         return float(data["weight"]) * factors[lane.road]

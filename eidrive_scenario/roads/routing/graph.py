@@ -38,6 +38,10 @@ JUNCTION_COST = 1e6
 """Cost of entering a junction where the fewest junctions are requested [m]; longer than any route."""
 MIN_CHANGE_WIDTH = 1.0
 """Minimum width of a lane in the middle of its section for a lane change to it [m]."""
+RESOLUTION = 1e-6
+"""Unit of costs, far more than rounding errors: routes of equal sums are equally cheap [m, or unit of the cost]."""
+HIGHEST = 1e12
+"""Maximum cost of an edge, above those of all routes; higher ones count as equal."""
 REACHED_DISTANCE = 0.01
 """Maximum distance of a destination behind the start that counts as reached [m]."""
 
@@ -159,31 +163,35 @@ def cheapest_path(
     cost   cost of an edge; by default its weight
     bound  lower bound of the cost from a node to the target; None: 0, as by Dijkstra
 
-    Of the paths with equal estimates, the one that was found first is continued first.
+    Costs are sums of whole multiples of RESOLUTION, which rounding does not affect. Of the paths with equal costs, the
+    one with the earliest lane changes is chosen, then that of the lowest road ids from the end: the result depends
+    neither on the order of the edges nor on `bound`.
     """
     numbers = count()
-    waiting: list[tuple[float, int, float, LaneKey, LaneKey | None]] = [(0.0, next(numbers), 0.0, source, None)]
-    least = {source: 0.0}
-    origins: dict[LaneKey, LaneKey | None] = {}
-    while waiting:
-        _, _, length, key, origin = heappop(waiting)
+    waiting: list[tuple[float, int, int, LaneKey]] = [(0.0, next(numbers), 0, source)]
+    least = {source: 0}
+    origins: dict[LaneKey, LaneKey] = {}
+    # Nodes of all cheapest paths have estimates of at most the cost of the target.
+    while waiting and waiting[0][0] <= least.get(target, math.inf):
+        _, _, length, key = heappop(waiting)
         if length > least[key]:
             continue
-        origins[key] = origin
-        if key == target:
-            path: list[LaneKey] = []
-            step: LaneKey | None = key
-            while step is not None:
-                path.append(step)
-                step = origins[step]
-            return path[::-1]
         for other, data in successors[key].items():
-            longer = length + (data["weight"] if cost is None else cost(key, other, data))
-            if longer < least.get(other, math.inf):
-                least[other] = longer
-                estimate = longer if bound is None else longer + bound(other)
-                heappush(waiting, (estimate, next(numbers), longer, other, key))
-    return None
+            edge = min(data["weight"] if cost is None else cost(key, other, data), HIGHEST)
+            longer = length + max(round(edge / RESOLUTION), 1)  # no edge is free: a path has no cycles
+            before = least.get(other, math.inf)
+            if longer < before:
+                least[other], origins[other] = longer, key
+                estimate = longer if bound is None else longer + bound(other) / RESOLUTION
+                heappush(waiting, (estimate, next(numbers), longer, other))
+            elif longer == before:
+                origins[other] = min(origins[other], key, key=lambda origin: (origin[:2] == other[:2], origin))
+    if target not in least:
+        return None
+    path = [target]
+    while (origin := origins.get(path[-1])) is not None:
+        path.append(origin)
+    return path[::-1]
 
 
 def _with_start_copy(successors: Successors, source: LaneKey) -> tuple[Successors, LaneKey]:

@@ -22,7 +22,7 @@ from opendrive_xml import (
 
 from eidrive_scenario.export.geometry import center_line
 from eidrive_scenario.roads import LaneKey, LaneLocation, RoadNetwork, RouteError
-from eidrive_scenario.roads.routing.graph import cheapest_path
+from eidrive_scenario.roads.routing.graph import Cost, cheapest_path
 
 
 @pytest.fixture
@@ -360,6 +360,49 @@ def test_cheapest_path_has_cost_of_networkx(seed: int) -> None:
     assert bounded is not None
     assert nx.path_weight(graph, found, "weight") == nx.path_weight(graph, bounded, "weight") == costs[keys[1]]
     assert squared == nx.dijkstra_path(graph, keys[0], keys[1], weight=lambda one, other, data: data["weight"] ** 2)
+
+
+@pytest.mark.parametrize("cost", [None, lambda lane, following, data: data["weight"]], ids=["A*", "Dijkstra"])
+def test_route_of_equally_cheap_ones_is_independent_of_file_and_offset(cost: Cost | None) -> None:
+    """Ways of 100 m lead left and right of the middle from `a` to `z`; their parts have different lengths."""
+    lanes = '<laneOffset s="0" a="1.75" b="0" c="0" d="0"/>' + section_xml(
+        right=lane_xml(-1, link=lane_links_xml(-1, -1))
+    )
+    generator = np.random.default_rng(5)
+    selected = set()
+    for _ in range(12):
+        x, y = generator.uniform(-3000.0, 3000.0, 2).tolist()
+        roads = [
+            road_xml("a", x=x - 100.0, y=y, lanes=lanes, link=successor_xml(junction="9")),
+            road_xml("z", x=x + 100.0 * math.sqrt(3.0) / 2.0, y=y, lanes=lanes, link=predecessor_xml(junction="8")),
+        ]
+        ways = [("b", 1, (0.3, 0.6, 49.1)), ("c", -1, (0.1, 0.2, 49.7))]
+        generator.shuffle(ways)
+        for name, side, lengths in ways:
+            ahead, aside = x, y
+            for number, (length, half) in enumerate([*((part, 1) for part in lengths), (50.0, -1)]):
+                before, after = (f"{name}{number - 1}" if number else "a", f"{name}{number + 1}" if number < 3 else "z")
+                heading = side * half * math.pi / 6.0
+                link = predecessor_xml(before) + successor_xml(after)
+                junction = {0: "9", 3: "8"}.get(number, "-1")
+                roads.append(
+                    road_xml(
+                        f"{name}{number}",
+                        x=ahead,
+                        y=aside,
+                        hdg=heading,
+                        length=length,
+                        lanes=lanes,
+                        link=link,
+                        junction=junction,
+                    )
+                )
+                ahead, aside = ahead + length * math.cos(heading), aside + length * math.sin(heading)
+        generator.shuffle(roads)
+        network = RoadNetwork.parse(map_xml(*roads, rest=junction_xml("9", "a", {f"{way[0]}0": -1 for way in ways})))
+        route = network.route(network.location("a", -1, 10.0), network.location("z", -1, 20.0), costs=[cost])
+        selected.add(route.lanes[1].road)
+    assert selected == {"b0"}
 
 
 @pytest.mark.parametrize("step", [3.5, -3.5])
