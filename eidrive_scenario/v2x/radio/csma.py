@@ -104,7 +104,8 @@ class Csma(MediumAccess):
         starts = self._starts
         others = sensed & np.isfinite(starts)
         others[row] = False
-        unaware = others & (starts < start + SLOT - TIME_TOLERANCE)
+        contends = self.ready <= start + TIME_TOLERANCE
+        unaware = others & contends & (starts < start + SLOT - TIME_TOLERANCE)
         self._fixed[unaware] = starts[unaware]
         waiting = others & ~unaware & ~np.isnan(self._slots)
         # Slots that were idle between the end of AIFS and this start; the backoff freezes while the medium is busy.

@@ -101,3 +101,29 @@ def test_receiver_below_the_sensing_threshold_of_a_message_is_free() -> None:
     reasons = locked({"Far": 0.0, "Near": 0.0003}, places)
     assert reasons["Far", "R"] == "sensing"
     assert reasons["Near", "R"] == ""
+
+
+def test_station_senses_messages_that_begin_before_its_gate_opens() -> None:
+    """The gates of two stations, which met after their first messages, open at 0.1 s and 5 µs later, within one slot.
+
+    The second message of B starts after that of A of 0.448 ms, AIFS of 110 µs, and 0 to 15 slots of 13 µs.
+    """
+    carrier = radio(1, jitter=0.0, congestion={"kind": "reactive"}, **QUIET)
+    carrier.update_environment(RadioEnvironment({"A": (0.0, 0.0, 1.5), "B": (200_000.0, 0.0, 1.5)}))
+    outbox = [
+        (replace(message(name, number, 0.0), offset=offset), [other])
+        for number in (0, 1)
+        for name, other, offset in (("A", "B", 0.0), ("B", "A", 5e-6))
+    ]
+    carrier.transmit(outbox, 0.0)
+    carrier.deliver("A", 0.05)
+    carrier.transmit([], 0.05)
+    carrier.update_environment(RadioEnvironment({"A": (0.0, 0.0, 1.5), "B": (50.0, 0.0, 1.5)}))
+    carrier.deliver("A", 0.2)
+    arrivals = {event.sender: event.arrives for event in carrier.transmit([], 0.2)}
+    first, second = arrivals["A"], arrivals["B"]
+    assert first == pytest.approx(0.100448)
+    assert second is not None
+    slots = (second - 0.101006) / 13e-6
+    assert slots == pytest.approx(round(slots), abs=1e-6)
+    assert 0 <= round(slots) <= 15
