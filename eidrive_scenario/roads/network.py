@@ -385,14 +385,21 @@ class RoadNetwork:
         """Return the lane location of a point, or None if no road is within `reach` [m].
 
         With a previous location as `hint`, that road and its successors and predecessors have priority if the point is
-        on one of their lanes. A road user that crosses a junction thus remains on its connecting road.
+        on one of their lanes. A road user that crosses a junction thus remains on its connecting road. Of other roads
+        that overlap in a junction, the location is on that of the nearest lane center, or of the default route if they
+        coincide.
         """
         if hint is not None and hint.road in self.roads:
             near = locate_near(self.roads, self.links, self.movement, x, y, hint)
             if near is not None:
                 return near
         heights = None if z is None else np.array([z])
-        return self._locator.locate(np.array([x]), np.array([y]), heights, reach).location(0)
+        nearest = self._locator.locate(np.array([x]), np.array([y]), heights, reach).location(0)
+        junction = None if nearest is None else self.roads[nearest.road].junction_id
+        if junction is None:
+            return nearest
+        overlapping = (place for place in self.locations_at(x, y) if self.roads[place.road].junction_id == junction)
+        return min(overlapping, key=lambda place: (*self._rank(place, abs(place.offset)), place[:2]), default=nearest)
 
     def locations_at(self, x: float, y: float) -> list[LaneLocation]:
         """Return the locations on all roads that overlap a point in plan view, on all levels."""
@@ -441,15 +448,16 @@ class RoadNetwork:
         if drivable:
             below = [location for location in below if self.lane(location).drivable] or below
         aligned = [location for location in below if angle(location) <= ALIGNED]
-        # Lanes that part later coincide at first: as on the default route.
-        best = min(aligned, key=lambda location: (round(deviation(location), 3), self._rank(location)), default=nearest)
+        best = min(aligned, key=lambda location: self._rank(location, deviation(location)), default=nearest)
         stays = is_same and deviation(nearest) <= deviation(best) + LEAST_GAIN
         return nearest if stays or best[:2] == nearest[:2] else best
 
-    def _rank(self, location: LaneLocation) -> float:
+    def _rank(self, location: LaneLocation, deviation: float) -> tuple[float, float]:
+        """Return the rank among overlapping lanes by the deviation from them [m]. Lanes that part later coincide at
+        first: then as on the default route."""
         road = self.road(location.road)
         turn = wrap_angle(road.reference.at(road.length).h - road.reference.at(0.0).h)
-        return default_rank(turn * road.driving_direction(location.lane), road)
+        return round(deviation, 3), default_rank(turn * road.driving_direction(location.lane), road)
 
     def lane(self, location: LaneLocation) -> Lane:
         """Return the lane of a location. Raise PositionError."""

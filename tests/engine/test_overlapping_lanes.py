@@ -141,6 +141,24 @@ def test_vehicle_that_enters_a_fork_is_on_the_default_route(
         assert (location.road, entered.road) == (default, default)
 
 
+@pytest.mark.parametrize("order", [("straight", "left", "right"), ("right", "left", "straight")])
+@pytest.mark.parametrize("offset", [0.0, 1234.56789, -0.1])
+def test_point_at_a_fork_is_on_the_lane_of_the_default_route(order: tuple[str, ...], offset: float) -> None:
+    """Three lanes coincide at the start; at 2.5 m the two that bend are 0.16 m beside the straight one."""
+    lanes = section_xml(right=lane_xml(-1, link=lane_links_xml(-1, -1)))
+    bends = {"straight": 0.0, "left": 0.05, "right": -0.05}
+    branches = [
+        road_xml(name, x=offset, y=offset, curvature=bends[name], junction="J", lanes=lanes, link=predecessor_xml("in"))
+        for name in order
+    ]
+    start = road_xml("in", x=offset - 100.0, y=offset, lanes=lanes, link=successor_xml(junction="J"))
+    roads = RoadNetwork.parse(map_xml(start, *branches, rest=junction_xml("J", "in", dict.fromkeys(order, -1))))
+    for x in (0.02, 0.5, 1.5, 2.5):
+        location = roads.locate_at(offset + x, offset - 1.75)
+        assert location is not None
+        assert location.road == "straight"
+
+
 def test_vehicle_handed_over_in_a_junction_stays_on_its_route(junction: RoadNetwork) -> None:
     """At 2 m after the start of a connecting road the lanes to all directions coincide within centimeters."""
     for road in connecting_roads(junction):
