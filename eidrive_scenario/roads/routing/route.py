@@ -325,12 +325,15 @@ class Route:
 
 def _join_legs(groups: Sequence[Sequence[Leg]]) -> tuple[Leg, ...]:
     """Return the legs of consecutive routes. Where one ends and the next one begins, both legs become one if no lane is
-    changed, or if one is too short for its lane change, which then begins or ends beyond the intermediate location."""
+    changed, or if one is too short for its lane change, which then begins or ends beyond the intermediate location;
+    not if the route turns back there, in a two-way lane."""
     legs = list(groups[0])
     for first, *others in groups[1:]:
         last = legs[-1]
         changes = [leg for leg in (last, first) if leg.lane != leg.lane_end]
-        if not changes or any(abs(leg.s_end - leg.s) < LANE_CHANGE_LENGTH for leg in changes):
+        turns_back = (last.s_end - last.s) * (first.s_end - first.s) < 0.0 and last.direction != first.direction
+        is_short = any(abs(leg.s_end - leg.s) < LANE_CHANGE_LENGTH for leg in changes)
+        if not turns_back and (is_short or not changes):
             longer = max((last, first), key=lambda leg: abs(leg.s_end - leg.s))
             legs[-1] = Leg(last.road, last.section, last.lane, first.lane_end, last.s, first.s_end, longer.direction)
         else:

@@ -335,6 +335,17 @@ def test_route_through_a_junction_twice_selects_the_branch_of_each_visit() -> No
     assert visit == 5
 
 
+def test_route_that_turns_back_in_a_two_way_lane_passes_its_waypoint() -> None:
+    """From 10 m to 100 m and back to 40 m."""
+    roads = RoadNetwork.parse(
+        map_xml(road_xml(length=200.0, lanes=section_xml(right=lane_xml(-1, kind="bidirectional"))))
+    )
+    start, waypoint, end = (roads.location("1", -1, s) for s in (10.0, 100.0, 40.0))
+    route = roads.route(start, end, [waypoint])
+    assert (route.length, route.reference_length) == pytest.approx((90.0 + 60.0, 90.0 + 60.0))
+    assert [route.location_at(distance).s for distance in (90.0, 120.0)] == pytest.approx([100.0, 70.0])
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_cheapest_path_has_cost_of_networkx(seed: int) -> None:
     generator = np.random.default_rng(seed)
