@@ -398,13 +398,14 @@ class RoadNetwork:
         junction = None if nearest is None else self.roads[nearest.road].junction_id
         if junction is None:
             return nearest
-        overlapping = (place for place in self.locations_at(x, y) if self.roads[place.road].junction_id == junction)
+        overlapping = (place for place in self.locations_at(x, y, z) if self.roads[place.road].junction_id == junction)
         return min(overlapping, key=lambda place: (*self._rank(place, abs(place.offset)), place[:2]), default=nearest)
 
-    def locations_at(self, x: float, y: float) -> list[LaneLocation]:
-        """Return the locations on all roads that overlap a point in plan view, on all levels."""
+    def locations_at(self, x: float, y: float, z: float | None = None) -> list[LaneLocation]:
+        """Return the locations on all roads that overlap a point in plan view, on all levels or on that of `z` [m]."""
         columns = (column.tolist() for column in self._locator.roads_at(x, y))
-        return [self.road_location(self.tables.ids[road], s, t) for road, s, t in zip(*columns, strict=True)]
+        locations = [self.road_location(self.tables.ids[road], s, t) for road, s, t in zip(*columns, strict=True)]
+        return locations if z is None else [location for location in locations if self.is_on_level(location, z)]
 
     def locate_pose(
         self,
@@ -440,7 +441,7 @@ class RoadNetwork:
         is_same = hint is not None and hint.road == nearest.road
         if is_on_level and (is_alone or (is_same and deviation(nearest) <= LEAST_GAIN)):
             return nearest
-        below = [location for location in self.locations_at(x, y) if z is None or self.is_on_level(location, z)]
+        below = self.locations_at(x, y, z)
         if not is_on_level:
             nearest = min(below, key=deviation) if below else self.locate_at(x, y, z=z) or nearest
         if len(below) < 2:

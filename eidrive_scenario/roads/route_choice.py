@@ -68,8 +68,7 @@ def lanes_near(roads: RoadNetwork, location: LaneLocation, *, on_all_levels: boo
     if roads.road(location.road).junction_id is None and (roads.is_level or not on_all_levels):
         return [location]
     x, y, z, *_ = roads.pose(location)
-    lanes = [lane for lane in roads.locations_at(x, y) if roads.lane(lane).drivable]
-    lanes = [lane for lane in lanes if on_all_levels or roads.is_on_level(lane, z)]
+    lanes = [lane for lane in roads.locations_at(x, y, None if on_all_levels else z) if roads.lane(lane).drivable]
     limit = AS_NEAR + min((abs(lane.offset) for lane in lanes), default=0.0)
     return [location, *(lane for lane in lanes if lane[:2] != location[:2] and abs(lane.offset) <= limit)]
 

@@ -159,6 +159,25 @@ def test_point_at_a_fork_is_on_the_lane_of_the_default_route(order: tuple[str, .
         assert location.road == "straight"
 
 
+@pytest.mark.parametrize("heights", [{"along": 0.0, "across": 8.0}, {"along": 8.0, "across": 0.0}])
+def test_point_in_a_junction_is_on_the_level_of_its_height(heights: dict[str, float]) -> None:
+    """The point is on the center of the lane along x, and 0.75 m beside that of the lane along y."""
+    lanes = section_xml(right=lane_xml(-1))
+    places = {"along": (-50.0, 1.75, 0.0), "across": (1.0, -50.0, math.pi / 2.0)}
+    roads = RoadNetwork.parse(
+        map_xml(
+            *(
+                road_xml(name, x=x, y=y, hdg=heading, junction="J", lanes=lanes, profiles=elevation_xml(heights[name]))
+                for name, (x, y, heading) in places.items()
+            )
+        )
+    )
+    for name, z in heights.items():
+        location = roads.locate_at(2.0, 0.0, z=z)
+        assert location is not None
+        assert location.road == name
+
+
 def test_vehicle_handed_over_in_a_junction_stays_on_its_route(junction: RoadNetwork) -> None:
     """At 2 m after the start of a connecting road the lanes to all directions coincide within centimeters."""
     for road in connecting_roads(junction):

@@ -332,11 +332,8 @@ def _objective(run: StoredRun, name: str | None) -> float | None:
     if name is not None:
         value: Any = run.result.get(name)
         return float(value) if _is_number(value) else None
-    # Metrics may end alike, but are no truth values
-    verdicts = [key for key, value in run.result.items() if key.endswith(".passed") and isinstance(value, bool)]
-    criteria = [key.removesuffix(".passed") for key in verdicts]
-    margins = [margin for criterion in criteria if (margin := _margin(run, criterion)) is not None]
-    return min(margins, default=1.0 if criteria else None)
+    margins = [margin for criterion in run.criteria if (margin := _margin(run, criterion)) is not None]
+    return min(margins, default=1.0 if run.criteria else None)
 
 
 def _margin(run: StoredRun, criterion: str) -> float | None:

@@ -91,6 +91,16 @@ class StoredRun(msgspec.Struct, frozen=True):
         """Whether criteria judged the run."""
         return self.status in (PASSED, FAILED)
 
+    @property
+    def criteria(self) -> list[str]:
+        """Names of the criteria of the run. Metrics may end in `.passed`, too, but are no truth values."""
+        end = ".passed"
+        return [
+            name.removesuffix(end)
+            for name, value in self.result.items()
+            if name.endswith(end) and isinstance(value, bool)
+        ]
+
 
 class ResultStore:
     """Results of sweeps. Only one process writes; the results of runs are on the disk when `add` returns.

@@ -111,11 +111,8 @@ def _as_result(run: StoredRun) -> dict[str, Any]:
     result = run.result
     count = result.get("warnings")
     settings = json.loads(run.settings) if run.settings else {}
-    # Metrics may end alike, such as those of a monitor with the name door.passed, but are no truth values
-    verdicts = [name for name, value in result.items() if name.endswith(".passed") and isinstance(value, bool)]
-    names = [name.removesuffix(".passed") for name in verdicts]
-    of_criteria = {name + end for name in names for end in _ENDINGS}
-    criteria = [{"name": name, **{end[1:]: result.get(name + end) for end in _ENDINGS}} for name in names]
+    of_criteria = {name + end for name in run.criteria for end in _ENDINGS}
+    criteria = [{"name": name, **{end[1:]: result.get(name + end) for end in _ENDINGS}} for name in run.criteria]
     return {
         "scenario": run.scenario,
         "run": run.run,

@@ -83,8 +83,8 @@ def _read_validity(road: Road, s: float, element: etree._Element, collector: Att
     first, last = (collector.integer(element, name) for name in ("fromLane", "toLane"))
     lanes = road.section_at(s).lanes if road.sections else {}
     if lanes and not any(min(first, last) <= number <= max(first, last) for number in lanes):
-        which = f"lane {first}" if first == last else f"lanes {first} to {last}"
-        message = f"a signal at s = {s:g} m of road {road.id!r} is valid for {which}, which do not exist there"
+        which = f"lane {first}, which does" if first == last else f"lanes {first} to {last}, which do"
+        message = f"a signal at s = {s:g} m of road {road.id!r} is valid for {which} not exist there"
         hint = "known: " + ", ".join(map(str, sorted(lanes)))
         kind = "signals for lanes that do not exist"
         collector.report_warning(element, MapRule.SIGNAL_OFF_ROAD, kind, message, hint)

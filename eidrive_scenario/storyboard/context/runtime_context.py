@@ -48,8 +48,9 @@ class RuntimeContext(ActionContext, ControllerContext):
         """Whether an action reaches its goal in the current step."""
         self.pending_actions: list[Callable[[], None]] = []
         """Functions that stop actions that have started at this instant if their entity is still absent."""
-        self.instant_actions: list[tuple[str | None, Callable[[], None]]] = []
-        """Actor and update of each behaviour that takes no time, in the order of their starts at this instant."""
+        self.instant_actions: list[Callable[[], None]] = []
+        """Functions that execute actions with behaviours that take no time, in the order of their starts at this
+        instant."""
         self._holders: list[tuple[str, Domain, PreemptableAction, ActionBehaviour]] = []
         """Control domains with their actors, and the element and the behaviour that hold them."""
 

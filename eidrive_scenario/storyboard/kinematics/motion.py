@@ -213,10 +213,11 @@ class Motion(MotionState):
             self._speed = 0.0
         self._stops = False
         distance = self._speed * dt if lane_distance is None else lane_distance
+        along_lane = not self._crosses or (lane_distance is not None and self._carried)
         if self._teleport:
             self._teleport = False
             if lane_distance is not None and target is None:
-                self._move(lane_distance, None, dt, along_lane=not self._crosses or self._carried)
+                self._move(distance, None, dt, along_lane=along_lane)
             placement = self.placement()
             if self._leaves_curve:
                 self.leave_curve(after_step=False)
@@ -239,7 +240,6 @@ class Motion(MotionState):
             stands = self._speed == 0.0 and math.copysign(1.0, self._speed) == 1.0
             self._rests = stands and not self._end_of_road and not self._teleported
         else:
-            along_lane = not self._crosses or (lane_distance is not None and self._carried)
             self._move(distance, steering, dt, along_lane=along_lane)
         x, y, z, h, p, r = self._pose
         across = distance == 0.0 or target is not None or lane_distance is not None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
+from itertools import takewhile
 
 from py_trees.common import Status
 
@@ -129,10 +130,10 @@ class ActionElement(StoryElement):
         self._completing, self._awaiting = [], {}
         self.executions += 1
         self._change(ElementTransition.START, ElementState.RUNNING, why)
+        if any(behaviour.at_once for behaviour in self.running):
+            self.context.instant_actions.append(self.decide)
         for behaviour in self.running:
             behaviour.stop(Status.INVALID)
-            if behaviour.at_once:
-                self.context.instant_actions.append((behaviour.actor_name, self.decide))
             self.context.acquire_domain(behaviour.actor_name, behaviour.controls, self, behaviour)
             if behaviour.immediate:
                 self._update_behaviour(behaviour)
@@ -165,11 +166,9 @@ class ActionElement(StoryElement):
         done = False
         if behaviour in self.running:
             if behaviour.at_once and self._decided_at is None and self._tried_at == self.context.progress.tick:
-                for name, decide in self.context.instant_actions:
-                    if decide == self.decide:
-                        break
-                    if name == behaviour.actor_name:
-                        decide()  # It starts from the place of a TeleportAction before it
+                # A lateral step starts from the place of a TeleportAction before it
+                for decide in list(takewhile(self.decide.__ne__, self.context.instant_actions)):
+                    decide()
                 self._update_behaviour(behaviour)
                 done = behaviour.status is Status.SUCCESS
             behaviour.stop(Status.INVALID)

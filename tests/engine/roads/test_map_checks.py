@@ -211,7 +211,7 @@ def test_negative_sizes_of_objects_count_as_omitted_with_a_warning() -> None:
 
 @pytest.mark.parametrize(
     ("first", "last", "which"),
-    [(-3, -2, "lanes -3 to -2"), (2, 2, "lane 2"), (-3, -1, ""), (1, 1, ""), (0, 0, "")],
+    [(-3, -2, "lanes -3 to -2, which do"), (2, 2, "lane 2, which does"), (-3, -1, ""), (1, 1, ""), (0, 0, "")],
 )
 def test_signal_for_lanes_that_do_not_exist_is_a_warning(first: int, last: int, which: str) -> None:
     """The road has two lanes to the right up to 60 m."""
@@ -223,8 +223,7 @@ def test_signal_for_lanes_that_do_not_exist_is_a_warning(first: int, last: int, 
     text = map_xml(road_xml(lanes=lanes, extra=f"<signals>{signal}</signals>"))
     warnings = [message for rule, message in map_warnings(text) if rule == "signal-off-road"]
     assert warnings == [
-        f"a signal at s = 80 m of road '1' is valid for {shown}, which do not exist there"
-        for shown in filter(None, [which])
+        f"a signal at s = 80 m of road '1' is valid for {shown} not exist there" for shown in filter(None, [which])
     ]
 
 
