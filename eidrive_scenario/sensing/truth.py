@@ -15,7 +15,7 @@ from eidrive_scenario.sensing.readings import TruthReading
 from eidrive_scenario.sensing.sensor import Point, Scene, Sensor, mounting
 from eidrive_scenario.sensing.settings import SensorSettings, TruthSettings
 from eidrive_scenario.world.actor import ActorSpec
-from eidrive_scenario.world.view import NOTHING, WorldView
+from eidrive_scenario.world.view import GROUND, NOTHING, WorldView
 
 INSET = 0.9
 """Position of the sampled corners as a share of the distance from center to corner, so that a ray to one hits the body.
@@ -167,6 +167,13 @@ def visibilities(
         rows = np.array(scene.first_hit(begin.tolist(), end.tolist()))
     met = np.asarray(rows).reshape(len(target_of), len(SAMPLES))
     in_sight = (met == target_of[:, None]) | (met == NOTHING)
+    # The road hides what stands on it from below, but bodies are hit up to a millimeter before their underside: these
+    # rays are cast again, from inside the body.
+    from_below = mounts[sensor_of, 2] < boxes[target_of, 2] - boxes[target_of, 5] / 2.0
+    target, ray = np.nonzero(in_sight & from_below[:, None])
+    if len(target):
+        begin, end = points[target, ray], starts[target, ray]
+        in_sight[target, ray] = scene.raycast(begin, end, sensor=name).rows != GROUND
     shares: list[float] = in_sight.mean(axis=1).tolist()
     return shares
 
@@ -174,7 +181,7 @@ def visibilities(
 def few_visibilities(
     sensors: Sequence[TruthSensor], own: Sequence[int], targets: Sequence[Sequence[int]], scene: Scene, view: WorldView
 ) -> list[float]:
-    """Return the same as `visibilities`, in scalar arithmetic if all bodies are upright."""
+    """Return the same as `visibilities`, in scalar arithmetic if all bodies are upright and none is seen from below."""
     if not view.is_upright:
         return visibilities(sensors, own, targets, scene, view)
     boxes = view.plain_boxes
@@ -185,6 +192,8 @@ def few_visibilities(
         if rows:
             origin, body = sensor.mounting.position(view, station), boxes[station]
             for row in rows:
+                if origin[2] < boxes[row][2] - boxes[row][5] / 2.0:
+                    return visibilities(sensors, own, targets, scene, view)
                 free.append(scene.is_free(station, origin, row))
                 if free[-1]:
                     continue

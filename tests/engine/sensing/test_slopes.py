@@ -99,3 +99,18 @@ def test_truth_sensor_on_a_bridge_does_not_detect_a_car_below_it() -> None:
         truth = TruthSensor(TruthSettings(), world.spec("Ego"))
         assert few_visibilities([truth], [0], [[1]], world, view) == [0.0]
         assert visibilities([truth], [0], [[1]], world, view) == [0.0]
+
+
+@pytest.mark.parametrize("x", [0.0, 4e5])
+def test_truth_sensor_below_a_bridge_does_not_detect_a_car_on_it(x: float) -> None:
+    """The lines from 1.9 m at x = -9.5 m to the car, up to 7.4 m, cross the bridge at x > -3.2 m, within its 7 m."""
+    roads = road_xml(x=x - 50.0), road_xml("2", x=x, y=-50.0, hdg=math.pi / 2.0, profiles=elevation_xml(6.0))
+    network = RoadNetwork.parse(map_xml(*roads))
+    with World(network) as world:
+        for name, road, s in (("Ego", "1", 40.0), ("Car", "2", 45.0)):
+            pose = network.lane_pose_at(road, -1, s)
+            world.add(dataclasses.replace(CAR, name=name), Placement(pose.x, pose.y, pose.z, pose.h))
+        view = world.view()
+        truth = TruthSensor(TruthSettings(), world.spec("Ego"))
+        assert few_visibilities([truth], [0], [[1]], world, view) == [0.0]
+        assert visibilities([truth], [0], [[1]], world, view) == [0.0]
