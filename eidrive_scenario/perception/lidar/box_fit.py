@@ -168,6 +168,9 @@ POOR_FIT = 9.0
 three sizes, three in a hundred objects of the class exceed it."""
 ABOVE_TOP = 0.3
 """Height of a sensor above an object from which its top is visible [m]."""
+ON_RAY = 1e-9
+"""Maximum distance of an end from the sensor along an axis that is a rounding error [m]: the points of one column show
+no end across their rays, and the object extends to both sides."""
 DROP, TRUNK = 0.35, 1.0
 """Height of the top above the lower ends of an object, as a share, and maximum length of these [m]: a roof hides the
 trunk or the hood behind it."""
@@ -248,7 +251,8 @@ def fit_box(
     hypotheses: list[_Hypothesis] = []
     for shape in shapes:
         spans = _spans(points, shape, sensor_height - ground, top, pattern, hidden, cut)
-        for lengthwise in axes:
+        # The longer side first: of equally likely axes of the length, the first would depend on the axes of the frame.
+        for lengthwise in sorted(axes, key=lambda axis: shape.low[axis] - shape.high[axis]):
             yaw = shape.yaw + lengthwise * math.pi / 2.0
             if heading_cost is not None:
                 turned = heading_cost(yaw)
@@ -337,7 +341,8 @@ def _spans(
     axes = ((math.cos(shape.yaw), math.sin(shape.yaw)), (-math.sin(shape.yaw), math.cos(shape.yaw)))
     x, y = points[:, :2].mean(axis=0).tolist()
     distance = math.hypot(x, y)
-    gaps = [max(low, -high, 0.0) for low, high in zip(shape.low, shape.high, strict=True)]
+    gaps = [max(low, -high) for low, high in zip(shape.low, shape.high, strict=True)]
+    gaps = [gap if gap > ON_RAY else 0.0 for gap in gaps]
     over = above - top
     spans = []
     for axis, (ax, ay) in enumerate(axes):
@@ -351,7 +356,7 @@ def _spans(
             lower_end = min(DROP * top * distance / over, TRUNK)
             across = math.sqrt(1.0 - min(outwards**2, 1.0))
             spacing = min(spacing, outwards * (rings + lower_end) + across * columns)
-        open_low, open_high = not low > 0.0, not high < 0.0
+        open_low, open_high = low <= ON_RAY, high >= -ON_RAY
         ends = _hidden_ends(points[:, :2], (ax, ay), low, high, hidden)
         depth = shape.high[1 - axis] - shape.low[1 - axis]
         if depth <= THIN < high - low:

@@ -178,6 +178,24 @@ def test_fit_box_of_mirrored_points_is_mirrored() -> None:
     np.testing.assert_allclose(one.covariance * [[1, -1], [-1, 1]], other.covariance, atol=1e-9)
 
 
+def test_fit_box_of_equally_likely_axes_turns_with_the_points() -> None:
+    """A side of 1.5 m, of which something hides both ends, may be a part of the length or of the width."""
+    points = standing(outline(20, 4, 1.5, 0.2, 1.0), 1.5)
+    plain, turned = (fit(part, hidden=(True, True)) for part in (points, points[:, [1, 0, 2]] * (-1, 1, 1)))
+    x, y, *sizes, yaw = plain.box
+    assert turned.box == pytest.approx((-y, x, *sizes, yaw + math.pi / 2))
+
+
+@pytest.mark.parametrize("degrees", range(0, 360, 20))
+def test_fit_box_of_single_column_is_centered_on_its_ray(degrees: int) -> None:
+    x, y = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    points = np.array(
+        [(x * reach, y * reach, z) for reach, z in ((18.0, 0.4), (18.03, 0.8), (18.01, 1.2), (18.1, 1.6))]
+    )
+    box = fit(points, classes=("pedestrian",)).box
+    assert x * box[1] - y * box[0] == pytest.approx(0.0, abs=1e-9)
+
+
 def test_fit_box_covariance_is_consistent_with_errors() -> None:
     """Squared Mahalanobis distances for cars of varied sizes from all sides with sparse rays."""
     rng = np.random.default_rng(8)
