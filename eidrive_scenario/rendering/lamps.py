@@ -9,11 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eidrive_scenario.base.arrays import Array, Floats, Integers
+from eidrive_scenario.base.arrays import Array, Floats
 from eidrive_scenario.base.kernels import kernel
 from eidrive_scenario.rendering.model import Light, linear
-from eidrive_scenario.rendering.projection import CameraView, Surfaces
-from eidrive_scenario.rendering.rasterization import Cover
+from eidrive_scenario.rendering.projection import CameraView
 from eidrive_scenario.world.actor import ActorSpec
 from eidrive_scenario.world.appearance import Appearance, LightState
 from eidrive_scenario.world.weather import Weather
@@ -97,8 +96,6 @@ REACH = 70.0
 """Maximum range of the light of a lamp [m]."""
 _WIDTH, _HEIGHT = 1.2, 0.6
 """Maximum tangents of the angles to the axis of a lamp."""
-_STRIDE = 4
-"""Distance between the lines and columns of the sample that locates the lit area."""
 _FINE = 200
 """Steps of the intensity table per unit of the lateral tangent; twice as many vertically."""
 _COLUMNS = round(2 * _WIDTH * _FINE) + 1
@@ -152,116 +149,73 @@ def intensity(aside: Array, above: Array, high: bool) -> Array:
 
 _BESIDE_THE_CAMERA = 4.0
 """Maximum distance of lamps that illuminate along the rays of the camera, so that sheeting returns the light [m]."""
-_SQUARE = np.ones((3, 3), dtype=np.uint8)
 
 
-class Lamplight(NamedTuple):
-    """Light on the surfaces in pixels (P,), and light across the rays of lamps beside the camera [lx]."""
+class Lamp(NamedTuple):
+    """Beam as seen by a camera: position relative to it and axes forward, left, up (4, 3), table of the intensity, its
+    scale, and whether it is beside the camera."""
 
-    received: Floats
-    across: Floats
+    frame: Floats
+    table: Floats
+    scale: np.float32
+    is_beside: bool
 
-
-def lamplight(beams: Sequence[Beam], cover: Cover, surfaces: Surfaces, view: CameraView) -> Lamplight | None:
-    """Return the light of all beams, computed at every second pixel in both directions; None if the image is empty."""
-    triangle = cover.triangle[::2, ::2]
-    seen = triangle >= 0
-    if not seen.any():
-        return None
-    places = view.places(np.arange(cover.triangle.size).reshape(view.shape)[::2, ::2][seen], cover.nearness)
-    points = np.full(seen.shape, -1)
-    points[seen] = np.arange(places.shape[1])
-    normals, light = surfaces.normal[triangle[seen]], np.zeros((2, places.shape[1]), dtype=np.float32)
-    for beam in beams:
+    @classmethod
+    def of(cls, beam: Beam, view: CameraView) -> Lamp:
+        """Return the beam as seen by a camera."""
         offset = beam.position - view.position
-        is_beside = float(np.linalg.norm(offset)) < _BESIDE_THE_CAMERA
         frame = np.ascontiguousarray(np.vstack([offset, beam.axes.T]), dtype=np.float32)
-        _shine(points, places, normals, frame, _table(beam.high), np.float32(2.0 * beam.brightness), is_beside, light)
-    with np.errstate(divide="ignore"):
-        distance = view.own[2].reshape(view.shape) / cover.nearness
-    received, across = (_spread(part, seen, distance).ravel() for part in light)
-    return Lamplight(received, across)
+        is_beside = float(np.linalg.norm(offset)) < _BESIDE_THE_CAMERA
+        return cls(frame, _table(beam.high), np.float32(2.0 * beam.brightness), is_beside)
 
 
-@kernel("void(i8[:,::1], f4[:,::1], f4[:,::1], f4[:,::1], f4[::1], f4, b1, f4[:,::1])")
+def lamplight(lamps: Sequence[Lamp], triangle: NDArray[np.int32], places: Floats, normals: Floats) -> Floats:
+    """Return the light (2, n) on the surfaces at points (4, n) of triangles (n,), and across the rays of lamps beside
+    the camera [lx]."""
+    light = np.zeros((2, len(triangle)), dtype=np.float32)
+    for lamp in lamps:
+        _shine(triangle, places, normals, lamp.frame, lamp.table, lamp.scale, lamp.is_beside, light)
+    return light
+
+
+@kernel("void(i4[::1], f4[:,::1], f4[:,::1], f4[:,::1], f4[::1], f4, b1, f4[:,::1])")
 def _shine(
-    points: Integers, places: Floats, normals: Floats, frame: Floats, table: Floats, scale: np.float32,
+    triangle: NDArray[np.int32], places: Floats, normals: Floats, frame: Floats, table: Floats, scale: np.float32,
     is_beside: bool, light: Floats,
 ) -> None:  # fmt: skip
     """Add the illuminance of points (4, n) by a pair of lamps to the light (2, n) on surfaces and across the beam [lx].
 
-    points  (h, w) of the image, -1 without one
     frame   (4, 3) position relative to the camera, and axes forward, left, up
     table   intensity of a lamp as by `_table`, to be scaled
     """
-    # The lit window by every fourth point in both directions
-    height, width = points.shape
-    top, bottom, left, right = height, -1, width, -1
-    for line in range(0, height, _STRIDE):
-        for column in range(0, width, _STRIDE):
-            if points[line, column] >= 0 and _tangents(places, points[line, column], frame)[0] < _WIDTH:
-                top, bottom, left, right = min(top, line), max(bottom, line), min(left, column), max(right, column)
-    if bottom < 0:
-        return
-    for line in range(max(top - _STRIDE, 0), min(bottom + _STRIDE, height)):
-        for column in range(max(left - _STRIDE, 0), min(right + _STRIDE, width)):
-            point = points[line, column]
-            if point < 0:
-                continue
-            aside, above = _tangents(places, point, frame)
-            if aside < _WIDTH:
-                cell = int(above * np.float32(2 * _FINE) + np.float32(_HEIGHT * 2 * _FINE)) * _COLUMNS
-                cell += int(aside * np.float32(_FINE) + np.float32(_WIDTH * _FINE))
-                dx, dy, dz = (
-                    places[0, point] - frame[0, 0],
-                    places[1, point] - frame[0, 1],
-                    places[2, point] - frame[0, 2],
-                )
-                square = dx * dx + dy * dy + dz * dz
-                across = table[cell] * scale / square
-                facing = dx * normals[point, 0] + dy * normals[point, 1] + dz * normals[point, 2]
-                light[0, point] += across * max(-facing / np.sqrt(square), np.float32(0.0))
-                if is_beside:
-                    light[1, point] += across
-
-
-@kernel("UniTuple(f4, 2)(f4[:,::1], i8, f4[:,::1])")
-def _tangents(places: Floats, point: int, frame: Floats) -> tuple[np.float32, np.float32]:
-    """Return the tangents of the lateral and vertical angles of a point to the axis of a lamp; inf if it is not lit."""
-    dx, dy, dz = places[0, point] - frame[0, 0], places[1, point] - frame[0, 1], places[2, point] - frame[0, 2]
-    ahead = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
-    if np.float32(0.3) < ahead < np.float32(REACH):
-        aside = (dx * frame[2, 0] + dy * frame[2, 1] + dz * frame[2, 2]) / ahead
-        above = (dx * frame[3, 0] + dy * frame[3, 1] + dz * frame[3, 2]) / ahead
-        if abs(aside) < np.float32(_WIDTH) and abs(above) < np.float32(_HEIGHT):
-            return aside, above
-    return np.float32(np.inf), np.float32(np.inf)
-
-
-def _spread(values: Floats, seen: NDArray[np.bool_], distance: Floats) -> Floats:
-    """Return values of every second pixel in both directions for all pixels (H, W).
-
-    A pixel whose sample is empty uses the maximum of its neighbors. A pixel at another depth than the sample uses the
-    minimum, so that light does not leak over edges.
-    """
-
-    import cv2
-
-    grid = np.full(seen.shape, np.float32(-1.0))
-    grid[seen] = values
-    greatest = np.asarray(cv2.dilate(grid, _SQUARE), dtype=np.float32)
-    sampled_or_far: Floats = np.where(grid < 0.0, np.float32(np.inf), grid)
-    least = np.asarray(cv2.erode(sampled_or_far, _SQUARE), dtype=np.float32)
-    grid = np.where(grid < 0.0, np.maximum(greatest, np.float32(0.0)), grid)
-    sampled = np.where(seen, distance[::2, ::2], np.float32(0.0))
-    with np.errstate(invalid="ignore"):
-        near = np.abs(_doubled(sampled, distance.shape) - distance) < np.float32(0.06) * distance
-    whole = _doubled(grid, distance.shape)
-    spread: Floats = np.where(near, whole, np.minimum(_doubled(least, distance.shape), whole))
-    return spread
-
-
-def _doubled(grid: Floats, shape: tuple[int, ...]) -> Floats:
-    """Return a grid of every second pixel in both directions at all pixels."""
-    doubled: Floats = np.repeat(np.repeat(grid, 2, axis=0)[: shape[0]], 2, axis=1)[:, : shape[1]]
-    return doubled
+    x, y, z = frame[0, 0], frame[0, 1], frame[0, 2]
+    fx, fy, fz = frame[1, 0], frame[1, 1], frame[1, 2]
+    lx, ly, lz = frame[2, 0], frame[2, 1], frame[2, 2]
+    ux, uy, uz = frame[3, 0], frame[3, 1], frame[3, 2]
+    px, py, pz = places[0], places[1], places[2]
+    is_lit = np.empty(len(triangle), dtype=np.bool_)
+    # Few points are lit. Without branches and divisions, the processor compares several points at once.
+    for point in range(len(triangle)):
+        dx, dy, dz = px[point] - x, py[point] - y, pz[point] - z
+        ahead = dx * fx + dy * fy + dz * fz
+        aside = abs(dx * lx + dy * ly + dz * lz)
+        above = abs(dx * ux + dy * uy + dz * uz)
+        is_lit[point] = (
+            (ahead > np.float32(0.3))
+            & (ahead < np.float32(REACH))
+            & (aside < np.float32(_WIDTH) * ahead)
+            & (above < np.float32(_HEIGHT) * ahead)
+        )
+    for point, facet in enumerate(triangle):
+        if is_lit[point]:
+            dx, dy, dz = px[point] - x, py[point] - y, pz[point] - z
+            ahead = dx * fx + dy * fy + dz * fz
+            aside, above = (dx * lx + dy * ly + dz * lz) / ahead, (dx * ux + dy * uy + dz * uz) / ahead
+            cell = int(above * np.float32(2 * _FINE) + np.float32(_HEIGHT * 2 * _FINE)) * _COLUMNS
+            cell += int(aside * np.float32(_FINE) + np.float32(_WIDTH * _FINE))
+            square = dx * dx + dy * dy + dz * dz
+            across = table[cell] * scale / square
+            facing = dx * normals[facet, 0] + dy * normals[facet, 1] + dz * normals[facet, 2]
+            light[0, point] += across * max(-facing / np.sqrt(square), np.float32(0.0))
+            if is_beside:
+                light[1, point] += across

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from eidrive_scenario.base.arrays import Array, Floats, Integers
 from eidrive_scenario.rendering.daylight import daylight, dome
-from eidrive_scenario.rendering.lamps import Beam, Lamplight, lamplight
+from eidrive_scenario.rendering.lamps import Beam, Lamp
 from eidrive_scenario.rendering.materials import SOAKS
 from eidrive_scenario.rendering.model import MeshInstance
 from eidrive_scenario.rendering.projection import CameraView, cull_and_project
@@ -196,7 +196,7 @@ def _draw(canvas: _Canvas, visible: _Visible, beams: Sequence[Beam], at: Circums
     above = np.flatnonzero(triangle < 0)
     draw_pixels(canvas.light, above, sampled(at.sky, *at.view.directions(above)))
     shown = np.flatnonzero(triangle >= 0)
-    lamps = lamplight(beams, cover, surfaces, at.view) if beams else None
+    lamps = [Lamp.of(beam, at.view) for beam in beams]
     is_dry = at.weather.wetness <= 0.0
     _paint(canvas, shown, visible, lamps, at, fog=is_dry)
     if is_dry:
@@ -214,7 +214,7 @@ def _paint(
     canvas: _Canvas,
     pixels: Integers,
     visible: _Visible,
-    lamps: Lamplight | None,
+    lamps: Sequence[Lamp],
     at: Circumstances,
     *,
     fog: bool = True,
@@ -224,8 +224,7 @@ def _paint(
     for start in range(0, len(pixels), _AT_ONCE):
         part = pixels[start : start + _AT_ONCE]
         triangle, places = cover.triangle.ravel()[part], at.view.places(part, cover.nearness)
-        shone = None if lamps is None else Lamplight(lamps.received[part], lamps.across[part])
-        luminance = shade(triangle, places, lit, at, visible.shadows, shone, visible.open_sky.ravel()[part])
+        luminance = shade(triangle, places, lit, at, visible.shadows, lamps, visible.open_sky.ravel()[part])
         draw_through_air(canvas.light, part, luminance, places[3], at.weather if fog else None)
     far = np.float32(at.view.pinhole.far)
     label_pixels(
@@ -265,7 +264,7 @@ def _renewed(cached: _Kept, subjects: Subjects, beams: Sequence[Beam], at: Circu
         _draw(canvas, visible, beams, at, ground)
         return canvas
     canvas = _Canvas._make(values.copy() for values in cached.canvas)
-    _paint(canvas, np.flatnonzero(changed), visible, None, at)
+    _paint(canvas, np.flatnonzero(changed), visible, (), at)
     return canvas
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from eidrive_scenario.base.arrays import Array, Floats, Integers
 from eidrive_scenario.base.kernels import kernel
 from eidrive_scenario.rendering.daylight import GROUND_ALBEDO, Daylight, horizon, sample
-from eidrive_scenario.rendering.lamps import LAMP_COLOR, Lamplight
+from eidrive_scenario.rendering.lamps import LAMP_COLOR, Lamp, lamplight
 from eidrive_scenario.rendering.materials import GRAIN, MIRROR, RETURNS, SOAKS
 from eidrive_scenario.rendering.projection import CameraView, Surfaces
 from eidrive_scenario.rendering.shadows import ShadowGrid, Shadows
@@ -76,22 +77,23 @@ def shade(
     among: Lit,
     at: Circumstances,
     shadows: Shadows,
-    lamps: Lamplight | None,
+    lamps: Sequence[Lamp],
     open_sky: Floats,
 ) -> Floats:
     """Return the luminance (n, 3) of points at close distance [cd/m²]: sun and sky, lamps, and emission.
 
     triangle  (n,) index in `among`
     places    (4, n) as by `CameraView.places`
-    lamps     light of headlamps on the points
+    lamps     headlamps that shine on the points
     open_sky  (n,) share of sky light that nearby bodies leave
     """
     finish = among.surfaces.finish[triangle]
     sun = shadows.sun_share(places)
     luminance = np.empty((len(triangle), 3), dtype=np.float32)
     _illuminate(triangle, among.steady, among.sunny, open_sky, sun, luminance)
-    if lamps is not None:
-        shone = lamps.received * np.float32(1.0 / math.pi) + lamps.across * RETURNS[finish]
+    if lamps:
+        received, across = lamplight(lamps, triangle, places, among.surfaces.normal)
+        shone = received * np.float32(1.0 / math.pi) + across * RETURNS[finish]
         lamp_lit = np.flatnonzero(shone)
         albedo = among.surfaces.albedo[triangle[lamp_lit]]
         luminance[lamp_lit] += albedo * shone[lamp_lit, None] * LAMP_COLOR

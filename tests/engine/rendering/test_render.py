@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from sample_car import CarFactory
 
-from eidrive_scenario.rendering import picture_maker
+from eidrive_scenario.rendering import picture_maker, renderer
 from eidrive_scenario.rendering.daylight import SIZE, daylight, dome, horizon
 from eidrive_scenario.rendering.lamps import ABOVE_CUT_OFF, LOW_BEAM, intensity
 from eidrive_scenario.rendering.rasterization import rasterize
@@ -233,6 +234,19 @@ def test_headlamps_illuminate_a_wall_by_inverse_square_law(world: World, car: Ca
     expected = candela * (20.0 / distance) / distance**2 / math.pi
     seen = brightness(world.radiance(looking(0.0, height, x=eye), PINHOLE).luminance)[57:60, 70:90]
     np.testing.assert_allclose(seen, expected, rtol=0.02)
+
+
+def test_light_of_headlamps_is_that_of_each_pixel(
+    world: World, car: CarFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An image without its first column and line is the same: neighbors do not share their light."""
+    monkeypatch.setattr(renderer, "_with_glare", lambda image: image)
+    for name, x, y, yaw in (("Ego", 0.0, 0.0, 0.0), ("Ahead", 14.0, 1.0, 0.3), ("Oncoming", 25.0, 4.0, 3.0)):
+        world.add(car(name), Placement(x, y, yaw=yaw))
+    world.set_weather(load_weather("midnight"))
+    cut = replace(PINHOLE, width=159, height=119, center_x=79.0, center_y=59.0)
+    whole, part = (world.radiance(looking(0.0, x=2.0), pinhole).luminance for pinhole in (PINHOLE, cut))
+    np.testing.assert_allclose(part, whole[1:, 1:], rtol=1e-5)
 
 
 def test_wet_road_reflects_a_bright_wall(world: World) -> None:
